@@ -1,0 +1,234 @@
+"""The configuration of a run: everything that is needed to repeat it, checked when it is read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from evolve.encodings import ENCODINGS
+from evolve.fitness import FITNESS
+from evolve.optimizers import OPTIMIZERS
+
+if TYPE_CHECKING:
+    import warp_springs as ws
+    from evolve.encodings import Encoding
+    from evolve.optimizers import Optimizer
+
+__all__ = ["BODIES", "RunConfig", "SceneConfig", "SimulationConfig", "TaskConfig"]
+
+
+class Section(BaseModel):
+    """A table of the configuration: unchangeable, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class BodyConfig(Section):
+    """A body made by one of the shapes of `warp_springs`, standing on the ground."""
+
+    edge: float = Field(0.1, gt=0.0)
+    """Length of an edge [m]."""
+    stiffness: float = Field(1000.0, gt=0.0)
+    """Stiffness of the springs [N/m] unless the encoding decides it."""
+
+    def build(self) -> ws.Robot:
+        """Make the body."""
+        import warp_springs as ws
+
+        settings = self.model_dump()
+        return getattr(ws.shapes, settings.pop("shape"))(**settings)
+
+
+class CubeConfig(BodyConfig):
+    """Eight masses, 28 springs between all pairs."""
+
+    shape: Literal["cube"]
+    mass: float = Field(0.8, gt=0.0)
+    """Of the whole body [kg]."""
+
+
+class TetrahedronConfig(BodyConfig):
+    """Four masses, six springs."""
+
+    shape: Literal["tetrahedron"]
+    mass: float = Field(0.4, gt=0.0)
+    """Of the whole body [kg]."""
+
+
+class OctahedronConfig(BodyConfig):
+    """Six masses, 15 springs."""
+
+    shape: Literal["octahedron"]
+    mass: float = Field(0.6, gt=0.0)
+    """Of the whole body [kg]."""
+
+
+class LatticeConfig(BodyConfig):
+    """A block of nx x ny x nz voxels."""
+
+    shape: Literal["lattice"]
+    nx: int = Field(ge=1)
+    ny: int = Field(ge=1)
+    nz: int = Field(ge=1)
+    mass_per_vertex: float = Field(0.1, gt=0.0)
+    """[kg]"""
+
+
+class VoxelsConfig(BodyConfig):
+    """Voxels drawn as layers, the lowest first, each a map seen from above.
+
+    A layer is a list of rows, the farthest (largest y) first; a row runs along x and is either a
+    string in which '#' is a voxel and '.' is none, or a list of 1 and 0.
+    """
+
+    shape: Literal["voxels"]
+    layers: tuple[tuple[str | tuple[int, ...], ...], ...]
+    mass_per_vertex: float = Field(0.1, gt=0.0)
+    """[kg]"""
+
+    @field_validator("layers")
+    @classmethod
+    def _rectangular(cls, layers: tuple) -> tuple:
+        voxels = 0
+        for z, layer in enumerate(layers):
+            for y, row in enumerate(layer):
+                where = f"layer {z}, row {y}"
+                if wrong := set(row) - ({"#", "."} if isinstance(row, str) else {0, 1}):
+                    raise ValueError(f"{where}: {wrong.pop()!r} is neither a voxel nor none")
+                if len(layer) != len(layers[0]) or len(row) != len(layers[0][0]):
+                    raise ValueError(f"{where}: every layer and row must be as large as the first")
+                voxels += sum(cell in ("#", 1) for cell in row)
+        if not voxels:
+            raise ValueError("there is no voxel")
+        return layers
+
+    @property
+    def mask(self) -> np.ndarray:
+        """Which voxels exist, shape (nx, ny, nz), bool."""
+        cells = [[[c in ("#", 1) for c in row] for row in layer[::-1]] for layer in self.layers]
+        return np.array(cells, dtype=bool).transpose(2, 1, 0)
+
+    def build(self) -> ws.Robot:
+        """Make the body."""
+        import warp_springs as ws
+
+        settings = self.model_dump(exclude={"shape", "layers"})
+        return ws.shapes.voxels(self.mask, **settings)
+
+
+class GroundConfig(Section):
+    """The plane z = 0; the figures are rubber on concrete."""
+
+    stiffness: float = Field(1e5, gt=0.0)
+    """[N/m]"""
+    static_friction: float = Field(1.0, ge=0.0)
+    kinetic_friction: float = Field(0.8, ge=0.0)
+    friction: Literal["coulomb", "course"] = "coulomb"
+
+
+class SceneConfig(Section):
+    """Where the robots live."""
+
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    """[m/s^2]"""
+    damping: float = Field(1.0, ge=0.0)
+    """Rate at which velocities decay [1/s]."""
+    drag: float = Field(0.0, ge=0.0)
+    """Quadratic drag of a mass [kg/m]."""
+    ground: GroundConfig = GroundConfig()
+
+    def build(self) -> ws.Scene:
+        """Make the scene."""
+        import warp_springs as ws
+
+        settings = self.model_dump()
+        return ws.Scene(ground=ws.Ground(**settings.pop("ground")), **settings)
+
+
+class SimulationConfig(Section):
+    """How motion is computed."""
+
+    dt: float = Field(5e-4, gt=0.0)
+    """Time step [s]."""
+    precision: Literal["float64", "float32"] = "float64"
+    integrator: Literal["leapfrog", "euler"] = "leapfrog"
+    device: str = "cpu"
+    threads: int | None = Field(None, ge=1)
+    """Processor cores to use, all when left out. The results do not depend on it."""
+
+
+class TaskConfig(Section):
+    """What the robots have to do, and when they are believed."""
+
+    fitness: Literal[tuple(FITNESS)] = "speed"  # type: ignore[valid-type]
+    settle: float = Field(1.0, gt=0.0)
+    """How long they move before they are measured [cycles]."""
+    measure: float = Field(4.0, gt=0.0)
+    """How long they are measured [cycles]."""
+    second_look: float = Field(0.8, ge=0.0)
+    """Share of its fitness that a champion must keep at half the time step in float64."""
+
+
+def _choice(models: Any, key: str) -> Any:
+    """A section whose key says which of several models it is."""
+    models = tuple(models)
+    if len(models) == 1:
+        return models[0]
+    return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 (built at run time)
+
+
+BODIES = (CubeConfig, TetrahedronConfig, OctahedronConfig, LatticeConfig, VoxelsConfig)
+AnyBody = _choice(BODIES, "shape")
+AnyEncoding = _choice((cls.Settings for cls in ENCODINGS.values()), "type")
+AnyOptimizer = _choice((cls.Settings for cls in OPTIMIZERS.values()), "type")
+
+
+class RunConfig(Section):
+    """Everything that decides a run."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    """Also the name of its folder."""
+    about: str = ""
+    """What it evolves, in one line."""
+    seed: int = Field(1, ge=0)
+    """From which everything random follows."""
+    population: int = Field(512, ge=1, le=1_000_000)
+    """Robots evaluated in each generation."""
+    generations: int = Field(60, ge=1)
+    body: AnyBody
+    encoding: AnyEncoding
+    optimizer: AnyOptimizer
+    scene: SceneConfig = SceneConfig()
+    simulation: SimulationConfig = SimulationConfig()
+    task: TaskConfig = TaskConfig()
+
+    @model_validator(mode="after")
+    def _step_fits(self) -> RunConfig:
+        if self.simulation.dt > self.encoding.period / 10:
+            raise ValueError(
+                f"simulation.dt = {self.simulation.dt:g} s is too long for cycles of "
+                f"{self.encoding.period:g} s: at most a tenth of encoding.period"
+            )
+        return self
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of the whole run."""
+        return self.population * self.generations
+
+    @property
+    def fixed_body(self) -> bool:
+        """Whether all robots share one body, rather than evolving their own."""
+        return ENCODINGS[self.encoding.type].fixed_body
+
+    def make_encoding(self) -> Encoding:
+        """Make the encoding over the configured body."""
+        return ENCODINGS[self.encoding.type](self.body.build(), self.encoding)
+
+    def make_optimizer(self, encoding: Encoding) -> Optimizer:
+        """Make the optimizer at its very start."""
+        from evolve.streams import Streams
+
+        return OPTIMIZERS[self.optimizer.type](encoding, Streams(self.seed), self.optimizer)

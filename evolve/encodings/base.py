@@ -1,0 +1,98 @@
+"""What an encoding is: how a population of genomes varies, and how it becomes robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+if TYPE_CHECKING:
+    import warp_springs as ws
+
+__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes"]
+
+Genomes = Any
+"""A population of genomes. Only its encoding looks inside; everybody else may call `len`."""
+
+
+class EncodingSettings(BaseModel):
+    """What every encoding can be told; each adds its own, and a field `type` with its name."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    period: float = Field(1.0, gt=0.0)
+    """Length of an actuation cycle [s], the same for every robot and every spring."""
+
+
+class Encoding(Protocol):
+    """How genomes of one kind are made, varied, stored and expressed as robots.
+
+    Every method works on a whole population at once and returns a new one; none changes what it
+    was given. Random numbers come from the generator passed in and from nowhere else.
+    """
+
+    Settings: ClassVar[type[EncodingSettings]]
+    """The part of a run's configuration that belongs to this encoding."""
+    fixed_body: ClassVar[bool]
+    """Whether all robots share the topology of one given body."""
+
+    def __init__(self, body: ws.Robot, settings: EncodingSettings) -> None: ...
+
+    def random(self, n: int, rng: np.random.Generator) -> Genomes:
+        """Make n unrelated genomes."""
+
+    def mutate(self, genomes: Genomes, rng: np.random.Generator) -> Genomes:
+        """Make one changed copy of every genome."""
+
+    def cross(self, a: Genomes, b: Genomes, rng: np.random.Generator) -> Genomes:
+        """Make one child of every pair a[i], b[i]."""
+
+    def express(self, genomes: Genomes) -> Sequence[ws.Robot]:
+        """Build the robots, ready to be packed into one simulation."""
+
+    def distance(self, a: Genomes, b: Genomes) -> np.ndarray:
+        """How different a[i] and b[i] are, shape (n,): 0 for equal, about 1 for unrelated ones."""
+
+    def to_bytes(self, genomes: Genomes) -> list[bytes]:
+        """One blob for every genome; equal genomes give equal blobs on every machine."""
+
+    def from_bytes(self, blobs: Sequence[bytes]) -> Genomes:
+        """The genomes of which `to_bytes` made the blobs, exactly."""
+
+    def take(self, genomes: Genomes, indices: np.ndarray) -> Genomes:
+        """The genomes at `indices`, in that order."""
+
+    def concatenate(self, parts: Sequence[Genomes]) -> Genomes:
+        """One population from several."""
+
+
+class ArrayGenomes:
+    """The housekeeping of encodings whose population is one float32 array (n, *genome_shape)."""
+
+    genome_shape: tuple[int, ...]
+
+    def take(self, genomes: np.ndarray, indices: np.ndarray) -> np.ndarray:
+        """The genomes at `indices`, in that order."""
+        return genomes[indices]
+
+    def concatenate(self, parts: Sequence[np.ndarray]) -> np.ndarray:
+        """One population from several."""
+        return np.concatenate(parts)
+
+    def to_bytes(self, genomes: np.ndarray) -> list[bytes]:
+        """Every genome as its genes in little-endian float32."""
+        return [genome.tobytes() for genome in np.ascontiguousarray(genomes, dtype="<f4")]
+
+    def from_bytes(self, blobs: Sequence[bytes]) -> np.ndarray:
+        """The genomes of which `to_bytes` made the blobs; ValueError when a length is wrong."""
+        size = 4 * int(np.prod(self.genome_shape))
+        for i, blob in enumerate(blobs):
+            if len(blob) != size:
+                raise ValueError(
+                    f"genome {i} has {len(blob)} bytes, expected {size}: "
+                    "it belongs to another body or encoding"
+                )
+        genes = np.frombuffer(b"".join(blobs), dtype="<f4").astype(np.float32)
+        return genes.reshape(len(blobs), *self.genome_shape)

@@ -1,0 +1,173 @@
+"""What an optimizer is: ask for candidates, tell their scores; the bookkeeping of all of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from evolve.encodings.base import Encoding, Genomes
+from evolve.scores import Scores
+from evolve.streams import Streams
+
+__all__ = ["NOBODY", "Candidates", "Individuals", "Optimizer", "OptimizerSettings", "Recall"]
+
+NOBODY = -1
+"""In place of the id of a parent that does not exist."""
+
+
+class OptimizerSettings(BaseModel):
+    """What an optimizer can be told; each adds its own, and a field `type` with its name."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Genomes that wait for their scores."""
+
+    ids: np.ndarray
+    """Shape (n,), int64: numbered from 1 in the order of asking, unique within a run."""
+    genomes: Genomes
+    parents: np.ndarray
+    """Shape (n, 2), int64: ids of the first and second parent, `NOBODY` where there is none."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True)
+class Individuals:
+    """Genomes with their scores."""
+
+    ids: np.ndarray
+    """Shape (n,), int64."""
+    genomes: Genomes
+    scores: Scores
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+Recall = Callable[[np.ndarray], Individuals]
+"""Ids, shape (n,) -> these individuals, in that order, from the record of a run."""
+
+
+class Optimizer(ABC):
+    """Searches for genomes of high fitness, generation by generation.
+
+    ``candidates = optimizer.ask(n)`` and ``optimizer.tell(candidates, scores)`` in turn. The
+    optimizer knows nothing of robots: genomes vary by the operators of the encoding. Everything
+    it decides follows from the seed and the scores it was told, so ``state()`` plus the record of
+    the run suffice to continue with the same bits.
+
+    Attributes:
+        generation: How often scores were told.
+        evaluations: How many scores were told.
+        failures: How many of them were without fitness.
+        best_id: Id of the best individual so far, `NOBODY` while nobody has a fitness. Of equals,
+            the first.
+        best_fitness: Its fitness; NaN while nobody has one.
+    """
+
+    Settings: ClassVar[type[OptimizerSettings]]
+
+    def __init__(self, encoding: Encoding, streams: Streams, settings: OptimizerSettings) -> None:
+        self.encoding = encoding
+        self.streams = streams
+        self.settings = settings
+        self.generation = 0
+        self.evaluations = 0
+        self.failures = 0
+        self.best_id = NOBODY
+        self.best_fitness = float("nan")
+
+    def ask(self, n: int) -> Candidates:
+        """Make n candidates (n >= 1) for the current generation."""
+        if n < 1:
+            raise ValueError(f"an optimizer is asked for at least one candidate, not {n}")
+        genomes, parents = self._ask(n)
+        ids = self.evaluations + 1 + np.arange(n, dtype=np.int64)
+        return Candidates(ids, genomes, np.asarray(parents, dtype=np.int64))
+
+    def tell(self, candidates: Candidates, scores: Scores) -> None:
+        """Take the scores of the candidates and pass to the next generation."""
+        if len(scores) != len(candidates):
+            raise ValueError(f"{len(candidates)} candidates were told {len(scores)} scores")
+        worth = scores.worth
+        best = int(np.argmax(worth))
+        if worth[best] > (-np.inf if np.isnan(self.best_fitness) else self.best_fitness):
+            self.best_id = int(candidates.ids[best])
+            self.best_fitness = float(worth[best])
+        self._tell(Individuals(candidates.ids, candidates.genomes, scores))
+        self.generation += 1
+        self.evaluations += len(candidates)
+        self.failures += int(np.count_nonzero(np.isneginf(worth)))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a resumed run must be given back, as plain arrays: name -> array."""
+        counters = [self.generation, self.evaluations, self.failures, self.best_id]
+        return {
+            "counters": np.array(counters, dtype=np.int64),
+            "best_fitness": np.array([self.best_fitness]),
+            **self._state(),
+        }
+
+    def restore(self, state: Mapping[str, np.ndarray], recall: Recall) -> None:
+        """Return to a state; `recall` finds the individuals whose ids the state contains."""
+        counters = (int(x) for x in state["counters"])
+        self.generation, self.evaluations, self.failures, self.best_id = counters
+        self.best_fitness = float(state["best_fitness"][0])
+        self._restore(state, recall)
+
+    @abstractmethod
+    def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
+        """Return n genomes and the ids of their parents, shape (n, 2)."""
+
+    @abstractmethod
+    def _tell(self, individuals: Individuals) -> None:
+        """Learn from the scores of what was asked."""
+
+    @abstractmethod
+    def _state(self) -> dict[str, np.ndarray]:
+        """What this optimizer knows beyond the counters."""
+
+    @abstractmethod
+    def _restore(self, state: Mapping[str, np.ndarray], recall: Recall) -> None:
+        """Take back what `_state` returned."""
+
+    def _take(self, individuals: Individuals, indices: np.ndarray) -> Individuals:
+        """The individuals at `indices`, in that order."""
+        return Individuals(
+            individuals.ids[indices],
+            self.encoding.take(individuals.genomes, indices),
+            individuals.scores.take(indices),
+        )
+
+    def _concatenate(self, *parts: Individuals) -> Individuals:
+        """One group of individuals from several."""
+        return Individuals(
+            np.concatenate([part.ids for part in parts]),
+            self.encoding.concatenate([part.genomes for part in parts]),
+            Scores.concatenate([part.scores for part in parts]),
+        )
+
+
+class PopulationOptimizer(Optimizer):
+    """An optimizer whose whole knowledge is a group of surviving individuals."""
+
+    def __init__(self, encoding: Encoding, streams: Streams, settings: Any) -> None:
+        super().__init__(encoding, streams, settings)
+        self._survivors: Individuals | None = None
+
+    def _state(self) -> dict[str, np.ndarray]:
+        ids = [] if self._survivors is None else self._survivors.ids
+        return {"survivors": np.array(ids, dtype=np.int64)}
+
+    def _restore(self, state: Mapping[str, np.ndarray], recall: Recall) -> None:
+        ids = state["survivors"]
+        self._survivors = recall(ids) if len(ids) else None

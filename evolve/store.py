@@ -1,0 +1,366 @@
+"""The record of a run: one SQLite file that holds every evaluation and survives being killed.
+
+A generation is one transaction, so whatever moment the process dies at, the file holds whole
+generations and the state of the optimizer after the last of them. The tables are made to be
+asked in SQL::
+
+    -- everybody the champion descends from
+    WITH RECURSIVE line(id) AS (
+        SELECT :champion UNION SELECT parent FROM parent JOIN line ON child = line.id)
+    SELECT id, generation, fitness FROM individual JOIN line USING (id) ORDER BY id;
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from evolve.optimizers.base import NOBODY, Candidates
+from evolve.scores import Scores
+
+__all__ = ["Lock", "Record", "Store", "StoreError", "Timing"]
+
+APPLICATION_ID = 0x65766F6C
+"""Marks the files of this program among all SQLite files ("evol")."""
+SCHEMA_VERSION = 1
+
+SCHEMA = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE generation (
+    number INTEGER PRIMARY KEY,
+    evaluations INTEGER NOT NULL,         -- of the run, up to and with this generation
+    spring_evaluations INTEGER NOT NULL,  -- of this generation
+    evaluation_time REAL NOT NULL,        -- simulating and scoring [s]
+    driver_time REAL NOT NULL,            -- everything else [s]
+    finished TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
+);
+CREATE TABLE individual (
+    id INTEGER PRIMARY KEY,
+    generation INTEGER NOT NULL REFERENCES generation (number),
+    fitness REAL,                         -- NULL: the robot was stopped
+    status INTEGER NOT NULL,              -- of warp_springs.Status
+    spring_evaluations INTEGER NOT NULL,
+    genome BLOB NOT NULL
+);
+CREATE TABLE parent (
+    child INTEGER NOT NULL REFERENCES individual (id),
+    place INTEGER NOT NULL,               -- 0: first parent, 1: second
+    parent INTEGER NOT NULL REFERENCES individual (id),
+    PRIMARY KEY (child, place)
+) WITHOUT ROWID;
+CREATE TABLE descriptor (individual INTEGER PRIMARY KEY REFERENCES individual (id){columns});
+CREATE TABLE second_look (
+    individual INTEGER PRIMARY KEY REFERENCES individual (id),
+    dt REAL NOT NULL,                     -- step [s]
+    fitness REAL,                         -- at this step
+    kept REAL,                            -- this fitness / first fitness
+    survives INTEGER NOT NULL             -- 1: enough is left
+);
+CREATE TABLE optimizer (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL,
+    data BLOB NOT NULL) WITHOUT ROWID;
+"""
+
+
+class StoreError(Exception):
+    """A record cannot be used; the message is one line that says which file and why."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long the parts of a generation took [s]."""
+
+    evaluation: float
+    driver: float
+
+
+@dataclass(frozen=True)
+class Record:
+    """All evaluations of a run as columns, in the order of the ids; n of them."""
+
+    ids: np.ndarray
+    """Shape (n,), int64."""
+    generations: np.ndarray
+    """Shape (n,), int64."""
+    fitness: np.ndarray
+    """Shape (n,), float64; NaN = no fitness."""
+    status: np.ndarray
+    """Shape (n,), int64."""
+
+
+class Lock:
+    """Keeps a second process from writing to the same run; gone when its process is gone.
+
+    It is the exclusive lock of an empty SQLite file: the operating system takes it back from a
+    killed process, and readers of the record are not disturbed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._connection = sqlite3.connect(path, timeout=0.0, isolation_level=None)
+        try:
+            self._connection.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError:
+            self._connection.close()
+            raise StoreError(f"{path.parent} is being evolved by another process") from None
+
+    def release(self) -> None:
+        """Let others write."""
+        self._connection.close()
+
+
+class Store:
+    """An open record. Use `create` for a new one, `open` for one that exists."""
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        self.path = path
+        self._connection = connection
+
+    @classmethod
+    def create(cls, path: Path, meta: Mapping[str, str], descriptors: Sequence[str]) -> Store:
+        """Make the record of a run that has not begun, or open it if it is there already."""
+        if path.exists() and _has_tables(path):
+            return cls.open(path, write=True)
+        connection = sqlite3.connect(path, isolation_level=None)
+        connection.execute("PRAGMA page_size = 16384")
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        columns = "".join(f', "{name}" REAL' for name in descriptors)
+        store = cls(connection, path)
+        with store._transaction():
+            for statement in SCHEMA.format(columns=columns).split(";"):
+                connection.execute(statement)
+            connection.executemany("INSERT INTO meta VALUES (?, ?)", meta.items())
+            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        return store
+
+    @classmethod
+    def open(cls, path: Path, write: bool = False) -> Store:
+        """Open the record of a run.
+
+        Raises:
+            StoreError: The file does not exist, is broken, or was not written by this program or
+                was written by a newer one.
+        """
+        if not path.is_file():
+            raise StoreError(f"there is no record {path}")
+        mode = "rw" if write else "ro"
+        uri = f"{path.resolve().as_uri()}?mode={mode}"
+        connection = sqlite3.connect(uri, uri=True, isolation_level=None)
+        try:
+            _check(connection, path, thoroughly=write)
+            if write:
+                connection.execute("PRAGMA synchronous = FULL")
+        except BaseException:
+            connection.close()
+            raise
+        return cls(connection, path)
+
+    def close(self) -> None:
+        """Close the file; SQLite then folds its log into it."""
+        self._connection.close()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # -- writing ---------------------------------------------------------------------------------
+
+    def add_generation(
+        self,
+        number: int,
+        candidates: Candidates,
+        blobs: Sequence[bytes],
+        scores: Scores,
+        state: Mapping[str, np.ndarray],
+        timing: Timing,
+    ) -> None:
+        """Record a generation and the state of the optimizer after it, all or nothing."""
+        ids = candidates.ids.tolist()
+        fitness = [x if np.isfinite(x) else None for x in scores.fitness.tolist()]
+        cost = scores.spring_evaluations
+        generation = (number, ids[-1], int(cost.sum()), timing.evaluation, timing.driver)
+        rows = zip(
+            ids, [number] * len(ids), fitness, scores.status.tolist(), cost.tolist(), blobs,
+            strict=True,
+        )  # fmt: skip
+        parents = np.argwhere(candidates.parents != NOBODY)
+        links = np.column_stack(
+            [candidates.ids[parents[:, 0]], parents[:, 1], candidates.parents[tuple(parents.T)]]
+        )
+        described = zip(ids, *(v.tolist() for v in scores.descriptors.values()), strict=True)
+        with self._transaction():
+            execute, executemany = self._connection.execute, self._connection.executemany
+            execute(
+                "INSERT INTO generation (number, evaluations, spring_evaluations, "
+                "evaluation_time, driver_time) VALUES (?, ?, ?, ?, ?)",
+                generation,
+            )
+            executemany("INSERT INTO individual VALUES (?, ?, ?, ?, ?, ?)", rows)
+            executemany("INSERT INTO parent VALUES (?, ?, ?)", links.tolist())
+            columns = ", ".join(["individual", *(f'"{name}"' for name in scores.descriptors)])
+            marks = ", ".join("?" * (1 + len(scores.descriptors)))
+            executemany(f"INSERT INTO descriptor ({columns}) VALUES ({marks})", described)
+            execute("DELETE FROM optimizer")
+            executemany("INSERT INTO optimizer VALUES (?, ?, ?, ?)", map(_packed, state.items()))
+
+    def add_second_looks(self, ids: Iterable[int], dt: float, table: np.ndarray) -> None:
+        """Record second looks; the rows of `table` are (fitness, kept, survives), shape (n, 3)."""
+        rows = [
+            (int(i), dt, *map(float, row[:2]), int(row[2]))
+            for i, row in zip(ids, table, strict=True)
+        ]
+        with self._transaction():
+            self._connection.executemany(
+                "INSERT OR REPLACE INTO second_look VALUES (?, ?, ?, ?, ?)", rows
+            )
+
+    # -- reading ---------------------------------------------------------------------------------
+
+    @property
+    def meta(self) -> dict[str, str]:
+        """What was noted when the run was created."""
+        return dict(self._connection.execute("SELECT key, value FROM meta"))
+
+    @property
+    def generations(self) -> int:
+        """How many generations are complete."""
+        return self._connection.execute("SELECT count(*) FROM generation").fetchone()[0]
+
+    def optimizer_state(self) -> dict[str, np.ndarray]:
+        """State after the last complete generation; empty before the first."""
+        rows = self._connection.execute("SELECT name, dtype, shape, data FROM optimizer")
+        return {
+            name: np.frombuffer(data, dtype).reshape(json.loads(shape))
+            for name, dtype, shape, data in rows
+        }
+
+    def genomes(self, ids: Iterable[int]) -> list[bytes]:
+        """The genomes of individuals, in the order of the ids."""
+        query = "SELECT genome FROM individual WHERE id = ?"
+        return [self._one(query, i)[0] for i in ids]
+
+    def scores(self, ids: Iterable[int]) -> Scores:
+        """The scores of individuals, in the order of the ids."""
+        query = "SELECT fitness, status, spring_evaluations FROM individual WHERE id = ?"
+        cursor = self._connection.execute("SELECT * FROM descriptor LIMIT 0")
+        names = [column[0] for column in cursor.description[1:]]
+        ids = list(ids)
+        rows = [self._one(query, i) for i in ids]
+        described = [self._one("SELECT * FROM descriptor WHERE individual = ?", i)[1:] for i in ids]
+        table = np.array(described, dtype=np.float64).reshape(len(ids), len(names))
+        return Scores(
+            fitness=np.array([row[0] for row in rows], dtype=np.float64),
+            status=np.array([row[1] for row in rows]),
+            descriptors={name: table[:, i] for i, name in enumerate(names)},
+            spring_evaluations=np.array([row[2] for row in rows]),
+        )
+
+    def record(self) -> Record:
+        """All evaluations as columns."""
+        rows = self._connection.execute(
+            "SELECT id, generation, fitness, status FROM individual ORDER BY id"
+        ).fetchall()
+        table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+        ids, generations, status = (table[:, i].astype(np.int64) for i in (0, 1, 3))
+        return Record(ids, generations, table[:, 2], status)
+
+    def best(self, count: int) -> list[int]:
+        """Ids of the best individuals, the best first; equal genomes count once."""
+        ranking = self._connection.execute(
+            "SELECT id FROM individual WHERE fitness IS NOT NULL ORDER BY fitness DESC, id"
+        )
+        chosen: dict[bytes, int] = {}
+        for (individual,) in ranking:
+            if len(chosen) == count:
+                break
+            chosen.setdefault(self.genomes([individual])[0], individual)
+        return list(chosen.values())
+
+    def second_looks(self) -> dict[int, tuple[float, float | None, float | None, bool]]:
+        """Id -> (dt, fitness, kept, survives) of everybody who was looked at twice."""
+        rows = self._connection.execute(
+            "SELECT individual, dt, fitness, kept, survives FROM second_look"
+        )
+        return {row[0]: (row[1], row[2], row[3], bool(row[4])) for row in rows}
+
+    def totals(self) -> tuple[int, float, float]:
+        """Spring evaluations, seconds of evaluation and seconds of the driver, of the whole run."""
+        return self._connection.execute(
+            "SELECT coalesce(sum(spring_evaluations), 0), coalesce(sum(evaluation_time), 0.0), "
+            "coalesce(sum(driver_time), 0.0) FROM generation"
+        ).fetchone()
+
+    def digest(self) -> str:
+        """A hash over everything the run decided: genomes, scores, parents. Not times."""
+        digest = hashlib.sha256()
+        for query in (
+            "SELECT genome, id, generation, fitness, status FROM individual ORDER BY id",
+            "SELECT x'', child, place, parent FROM parent ORDER BY child, place",
+            "SELECT x'', * FROM descriptor ORDER BY individual",
+        ):
+            for blob, *values in self._connection.execute(query):
+                digest.update(f"{len(blob)} {values}\n".encode())
+                digest.update(blob)
+        return digest.hexdigest()
+
+    def _one(self, query: str, key: int) -> tuple:
+        row = self._connection.execute(query, (int(key),)).fetchone()
+        if row is None:
+            raise StoreError(f"{self.path} has no individual {key}")
+        return row
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """All of what happens within, or nothing."""
+        self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._connection.execute("ROLLBACK")
+            raise
+        self._connection.execute("COMMIT")
+
+
+def _packed(item: tuple[str, np.ndarray]) -> tuple[str, str, str, bytes]:
+    """A named array as a row: little-endian, so that it means the same on every machine."""
+    name, array = item
+    array = np.ascontiguousarray(array)
+    array = array.astype(array.dtype.newbyteorder("<"))
+    return name, array.dtype.str, json.dumps(array.shape), array.tobytes()
+
+
+def _has_tables(path: Path) -> bool:
+    """Whether a file is a record, or anything else than one that was killed at its creation."""
+    try:
+        with sqlite3.connect(path) as connection:
+            return bool(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    except sqlite3.DatabaseError:
+        return True
+
+
+def _check(connection: sqlite3.Connection, path: Path, thoroughly: bool) -> None:
+    """Refuse what is not a sound record of this version."""
+    try:
+        application = connection.execute("PRAGMA application_id").fetchone()[0]
+        version = connection.execute("PRAGMA user_version").fetchone()[0]
+        problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0] if thoroughly else "ok"
+    except sqlite3.DatabaseError as error:
+        raise StoreError(f"{path} cannot be read: {error}") from None
+    if application != APPLICATION_ID:
+        raise StoreError(f"{path} is not the record of an evolution")
+    if version > SCHEMA_VERSION:
+        raise StoreError(
+            f"{path} was written by a newer version of evolve "
+            f"(format {version}, this one reads up to {SCHEMA_VERSION})"
+        )
+    if problem != "ok":
+        raise StoreError(f"{path} is damaged: {problem.splitlines()[-1]}")

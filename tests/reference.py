@@ -1,0 +1,300 @@
+"""The physics of warp_springs once more, written plainly: one robot, NumPy, float64.
+
+Nothing here is shared with the simulator. `Trial` repeats its discrete algorithm step by step,
+one statement per rule, so that the two must agree to rounding. `continuum` knows no algorithm
+at all: it integrates the differential equations with Runge-Kutta steps, so that the algorithm
+itself can be judged.
+
+A robot is anything with the arrays of `warp_springs.Robot`, a scene anything with the fields of
+`warp_springs.Scene`. Units are SI, z is up, the ground is the plane z = 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+XY = slice(0, 2)
+Z = 2
+
+
+def speeds(vectors):
+    """Euclidean length of each row, shape (M,)."""
+    return np.sqrt((vectors * vectors).sum(axis=1))
+
+
+def rest_lengths(robot, time):
+    """L0(t) = rest_length + amplitude sin(omega t + phase) [m], shape (S,)."""
+    return robot.rest_length + robot.amplitude * np.sin(robot.omega * time + robot.phase)
+
+
+def spring_forces(robot, positions, time):
+    """Force of all springs on each mass [N], shape (M, 3): k (L - L0) towards the other end."""
+    forces = np.zeros_like(positions)
+    rest = rest_lengths(robot, time)
+    for spring, (i, j) in enumerate(robot.springs):
+        reach = positions[j] - positions[i]
+        length = np.sqrt(reach @ reach)
+        if length == 0.0:
+            continue  # no direction, so no force
+        pull = robot.stiffness[spring] * (length - rest[spring]) / length * reach
+        forces[i] += pull
+        forces[j] -= pull
+    return forces
+
+
+@dataclass
+class Energies:
+    """The four kinds of energy a lossless robot exchanges [J]."""
+
+    kinetic: float
+    gravity: float
+    spring: float
+    ground: float
+
+    @property
+    def total(self):
+        return self.kinetic + self.gravity + self.spring + self.ground
+
+
+def energies(robot, scene, positions, velocities, time):
+    """Energies [J] of a pose: textbook formulas, zero height at the origin."""
+    lengths = speeds(positions[robot.springs[:, 1]] - positions[robot.springs[:, 0]])
+    stretch = lengths - rest_lengths(robot, time)
+    depth = np.minimum(positions[:, Z], 0.0)
+    stiffness = scene.ground.stiffness if scene.ground is not None else 0.0
+    return Energies(
+        kinetic=0.5 * (robot.masses * (velocities**2).sum(axis=1)).sum(),
+        gravity=-(robot.masses * (positions @ np.asarray(scene.gravity))).sum(),
+        spring=0.5 * (robot.stiffness * stretch**2).sum(),
+        ground=0.5 * stiffness * (depth**2).sum(),
+    )
+
+
+class Trial:
+    """One robot stepped by the simulator's discrete algorithm.
+
+    `contact_substeps` is the number of velocity-Verlet sub-steps of the vertical motion that a
+    mass near the ground takes within a step of `leapfrog`; `euler` ignores it.
+
+    `margin` is the smallest relative distance of any stick-or-slip decision from its threshold.
+    The outcome of friction jumps there: where the margin is of the order of rounding, two correct
+    programs may part ways, and a comparison proves nothing.
+    """
+
+    def __init__(self, robot, scene, dt, integrator="leapfrog", contact_substeps=1):
+        self.robot = robot
+        self.scene = scene
+        self.dt = dt
+        self.contact_substeps = contact_substeps
+        self.positions = np.array(robot.positions, dtype=np.float64)
+        self.masses = np.asarray(robot.masses, dtype=np.float64)
+        self.gravity = np.asarray(scene.gravity, dtype=np.float64)
+        self.steps = 0
+        self.margin = np.inf
+        self._state = np.array(robot.velocities, dtype=np.float64)
+        self._advance = {"euler": self._euler, "leapfrog": self._leapfrog}[integrator]
+        self._is_synchronous = integrator == "euler"
+
+    def step(self):
+        """Advance by dt."""
+        self._advance()
+        self.steps += 1
+
+    def run(self, steps):
+        """Advance by `steps` steps; positions and velocities at every time, (steps + 1, M, 3)."""
+        positions, velocities = [self.positions.copy()], [self.velocities]
+        for _ in range(steps):
+            self.step()
+            positions.append(self.positions.copy())
+            velocities.append(self.velocities)
+        return np.array(positions), np.array(velocities)
+
+    @property
+    def time(self):
+        """The time reached [s], counted in whole steps from the start."""
+        return self.steps * self.dt
+
+    @property
+    def velocities(self):
+        """Velocities at the same instant as the positions [m/s], shape (M, 3).
+
+        Leapfrog keeps them half a kick behind; the missing half is added to a copy here. A mass
+        in the ground feels the friction of that half step too, so that a stuck mass reports rest.
+        """
+        velocities = self._state.copy()
+        if self._is_synchronous or self.steps == 0:
+            return velocities
+        half = self.dt / 2
+        velocities = self._dragged(self._damped(velocities, half), half)
+        velocities = self._kicked(velocities, half)
+        if self._friction == "coulomb":
+            impulse = self._normal_forces() / self.masses * half
+            self._rub(velocities, impulse)
+        return velocities
+
+    # The parts of a step.
+
+    @property
+    def _friction(self):
+        return None if self.scene.ground is None else self.scene.ground.friction
+
+    def _normal_forces(self):
+        """Force of the ground on each mass [N], shape (M,)."""
+        if self.scene.ground is None:
+            return np.zeros(len(self.masses))
+        return self.scene.ground.stiffness * np.maximum(-self.positions[:, Z], 0.0)
+
+    def _damped(self, velocities, duration):
+        return velocities * np.exp(-self.scene.damping * duration)
+
+    def _dragged(self, velocities, duration):
+        """The exact solution of dv/dt = -(c/m) |v| v over `duration`."""
+        rate = self.scene.drag * speeds(velocities) / self.masses
+        return velocities / (1.0 + rate * duration)[:, None]
+
+    def _note(self, value, threshold):
+        scale = max(value, threshold, np.finfo(float).tiny)
+        self.margin = min(self.margin, abs(value - threshold) / scale)
+
+    def _rub(self, velocities, impulse):
+        """Coulomb friction in place: `impulse` is the normal impulse per mass [m/s], (M,)."""
+        ground = self.scene.ground
+        for i in np.flatnonzero(impulse > 0.0):
+            slip = np.hypot(*velocities[i, XY])
+            self._note(slip, ground.static_friction * impulse[i])
+            if slip <= ground.static_friction * impulse[i]:
+                velocities[i, XY] = 0.0
+            else:
+                keep = 1.0 - ground.kinetic_friction * impulse[i] / slip
+                velocities[i, XY] *= max(0.0, keep)
+
+    def _course_rule(self, forces, velocities):
+        """The classroom rule in place: horizontal force against mu times the normal force."""
+        ground = self.scene.ground
+        normal = self._normal_forces()
+        for i in np.flatnonzero(normal > 0.0):
+            horizontal = np.hypot(*forces[i, XY])
+            self._note(horizontal, ground.static_friction * normal[i])
+            if horizontal < ground.static_friction * normal[i]:
+                forces[i, XY] = 0.0
+                velocities[i, XY] = 0.0
+            else:
+                keep = 1.0 - ground.kinetic_friction * normal[i] / horizontal
+                forces[i, XY] *= max(0.0, keep)
+
+    def _forces(self):
+        """Springs and weight [N], shape (M, 3)."""
+        weight = self.masses[:, None] * self.gravity
+        return spring_forces(self.robot, self.positions, self.time) + weight
+
+    # The classroom method: symplectic Euler.
+
+    def _euler(self):
+        dt = self.dt
+        forces = self._forces()
+        velocities = self._state
+        if self._friction == "course":
+            self._course_rule(forces, velocities)
+        velocities = velocities + forces / self.masses[:, None] * dt
+        impulse = self._normal_forces() / self.masses * dt
+        if self._friction == "coulomb":
+            self._rub(velocities, impulse)
+        velocities[:, Z] += impulse
+        velocities = self._dragged(self._damped(velocities, dt), dt)
+        self._state = velocities
+        self.positions = self.positions + velocities * dt
+
+    # Leapfrog: kick by the springs, drift with gravity and ground.
+
+    def _kicked(self, velocities, duration):
+        """`velocities` after the springs, and the weight that is not in the drift, acted."""
+        forces = self._forces()
+        if self.scene.ground is not None:
+            forces[:, Z] -= self.masses * self.gravity[Z]  # part of the drift
+        velocities = velocities.copy()
+        if self._friction == "course":
+            self._course_rule(forces, velocities)
+        return velocities + forces / self.masses[:, None] * duration
+
+    def _leapfrog(self):
+        dt, half = self.dt, self.dt / 2
+        velocities = self._state
+        if self.steps == 0:
+            velocities = self._kicked(velocities, half)
+        else:
+            velocities = self._dragged(self._damped(velocities, half), half)
+            velocities = self._kicked(velocities, dt)
+        velocities = self._damped(self._dragged(velocities, half), half)
+        if self.scene.ground is None:
+            self.positions = self.positions + velocities * dt
+        else:
+            impulse = self._fall(velocities)
+            if self._friction == "coulomb":
+                self._rub(velocities, impulse)
+            self.positions[:, XY] += velocities[:, XY] * dt
+        self._state = velocities
+
+    def _fall(self, velocities):
+        """Vertical motion over a step, in place; the ground's impulse per mass [m/s], (M,)."""
+        dt, g = self.dt, self.gravity[Z]
+        impulse = np.zeros(len(self.masses))
+        for i, mass in enumerate(self.masses):
+            z, w = self.positions[i, Z], velocities[i, Z]
+            free = z + w * dt + g * dt**2 / 2
+            if z < 0.0 or free < 0.0:
+                z, w, impulse[i] = self._contact(z, w, mass)
+            else:
+                z, w = free, w + g * dt
+            self.positions[i, Z], velocities[i, Z] = z, w
+        return impulse
+
+    def _contact(self, z, w, mass):
+        """Velocity-Verlet sub-steps of one mass under gravity and ground: z, w, impulse."""
+        g, h = self.gravity[Z], self.dt / self.contact_substeps
+        push = self.scene.ground.stiffness / mass
+        impulse = 0.0
+        for _ in range(self.contact_substeps):
+            up = push * max(-z, 0.0)
+            w += (g + up) * h / 2
+            z += w * h
+            impulse += up * h / 2
+            up = push * max(-z, 0.0)
+            w += (g + up) * h / 2
+            impulse += up * h / 2
+        return z, w, impulse
+
+
+def continuum(robot, scene, duration, steps):
+    """Positions and velocities (M, 3) after `duration` [s] by classical Runge-Kutta steps.
+
+    Solves the differential equations of springs, weight, damping, drag and a frictionless ground;
+    the scene's friction coefficients are ignored.
+    """
+    masses = robot.masses[:, None]
+    incidence = np.zeros((len(robot.masses), len(robot.springs)))
+    i, j = robot.springs.T
+    incidence[i, np.arange(len(i))] = 1.0
+    incidence[j, np.arange(len(j))] = -1.0
+
+    def acceleration(x, v, t):
+        reach = x[j] - x[i]
+        length = speeds(reach)
+        tension = robot.stiffness * (length - rest_lengths(robot, t)) / length
+        forces = incidence @ (tension[:, None] * reach) + masses * np.asarray(scene.gravity)
+        if scene.ground is not None:
+            forces[:, Z] += scene.ground.stiffness * np.maximum(-x[:, Z], 0.0)
+        if scene.drag:
+            forces -= scene.drag * speeds(v)[:, None] * v
+        return forces / masses - scene.damping * v
+
+    x, v = robot.positions.copy(), robot.velocities.copy()
+    h = duration / steps
+    for step in range(steps):
+        t = step * h
+        v1, a1 = v, acceleration(x, v, t)
+        v2, a2 = v + a1 * h / 2, acceleration(x + v1 * h / 2, v + a1 * h / 2, t + h / 2)
+        v3, a3 = v + a2 * h / 2, acceleration(x + v2 * h / 2, v + a2 * h / 2, t + h / 2)
+        v4, a4 = v + a3 * h, acceleration(x + v3 * h, v + a3 * h, t + h)
+        x = x + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return x, v

@@ -1,0 +1,237 @@
+"""Garbage in: absurd robots are stopped and named, and nobody else notices."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import warp_springs as ws
+
+DT = 1e-3
+DURATION = 0.3
+PRECISIONS = ["float64", "float32"]
+
+
+def cube(**fields):
+    body = ws.shapes.cube(edge=0.1, mass=0.8, stiffness=1000.0)
+    return body.replace(**fields).rotated((1, 2, 3), 0.7).moved((0, 0, 0.05))
+
+
+def with_one_velocity(speed):
+    velocities = np.zeros((8, 3))
+    velocities[3] = speed
+    return cube(velocities=velocities)
+
+
+def loose(positions, **fields):
+    return ws.Robot(
+        masses=0.1,
+        positions=positions,
+        springs=np.empty((0, 2), dtype=int),
+        stiffness=[],
+        **fields,
+    )
+
+
+@functools.cache
+def garbage():
+    """Robots that a search may make; each is well formed and physically absurd."""
+    body = ws.shapes.cube(edge=0.1, mass=0.8, stiffness=1000.0)
+    squeezed = np.array(body.positions)
+    squeezed[5] = squeezed[2]
+    crooked = body.positions * (1.0, 1.1, 0.9)
+    return {
+        "too stiff for the step": cube(stiffness=1e7, positions=crooked),
+        "absurdly stiff": cube(stiffness=1e300, positions=crooked),
+        "one mass at 1e300 m/s": with_one_velocity((1e300, 0, 0)),
+        "one mass at 1e30 m/s": with_one_velocity((0, 1e30, 0)),
+        "one mass at 2 km/s": with_one_velocity((0, 2e3, 0)),
+        "every mass at 1e300 m/s": cube(velocities=np.full((8, 3), 1e300)),
+        "breathing through zero": cube(amplitude=0.25, omega=20.0),
+        "breathing a kilometre": cube(amplitude=1e3, omega=20.0),
+        "breathing 1e300 m": cube(amplitude=1e300, omega=20.0),
+        "breathing at 1e300 rad/s": cube(amplitude=0.01, omega=1e300),
+        "coincident masses": cube(positions=squeezed),
+        "all masses in one point": cube(positions=np.zeros((8, 3))),
+        "duplicate springs": ws.Robot(
+            masses=0.1, positions=[(0, 0, 1), (0, 0, 1.1)], springs=[(0, 1)] * 9, stiffness=500.0
+        ),
+        "isolated masses": loose([(0, 0, 0.1), (5, 0, 0.2), (0, 9, 0.3)]),
+        "one mass": loose([(0, 0, 0.1)]),
+        "deep underground": cube().moved((0, 0, -30.0)),
+        "1e300 m away": loose([(1e300, 0, 1), (0, 0, 1)]),
+        "light as 1e-300 kg": cube(masses=1e-300),
+        "heavy as 1e300 kg": cube(masses=1e300),
+        "springs of no length": cube(rest_length=0.0),
+        "springs of 1e300 m": cube(rest_length=1e300),
+    }
+
+
+def healthy():
+    """A healthy neighbour in the cube's own topology, and one in another."""
+    lattice = ws.shapes.lattice(2, 1, 1, stiffness=1500.0)
+    return [
+        cube(amplitude=0.005, omega=10.0).spinning((1, 2, 3)),
+        cube().spinning((3, 1, 2)),
+        lattice.rotated((1, 0, 2), 0.4).moved((0, 0, 0.05)),
+        loose([(0, 0, 0.1)], velocities=[(0.1, 0.2, 0.3)]),
+        loose([(0, 0, 0.1), (1, 0, 0.2), (0, 1, 0.3)]),
+    ]
+
+
+def simulate(robots, precision="float64", integrator="leapfrog", **options):
+    scene = ws.Scene(damping=0.1, drag=0.01)
+    simulation = ws.Simulation(
+        robots, scene, dt=DT, precision=precision, integrator=integrator, **options
+    )
+    return simulation.run(DURATION, fps=50, energy=True)
+
+
+def bits(result, robot):
+    parts = (
+        result.positions(robot),
+        result.velocities(robot),
+        result.frames(robot),
+        result.center_of_mass[robot],
+        result.energy.total[robot],
+    )
+    return [part.tobytes() for part in parts]
+
+
+@functools.cache
+def crowd(precision, integrator):
+    """Healthy robots with all the garbage between them, run once for several tests."""
+    neighbours = healthy()
+    robots = []
+    for i, bad in enumerate(garbage().values()):
+        robots += [bad, neighbours[i % len(neighbours)]]
+    return robots, simulate(robots, precision, integrator)
+
+
+@pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_every_robot_ends_in_a_finite_pose(precision, integrator):
+    robots, result = crowd(precision, integrator)
+    for i, name in enumerate(garbage()):
+        slot = 2 * i
+        if not _fits(robots[slot], precision):
+            assert result.status[slot] != ws.Status.OK, name
+            continue
+        assert np.isfinite(result.positions(slot)).all(), name
+        assert np.isfinite(result.velocities(slot)).all(), name
+        assert np.isfinite(result.frames(slot)).all(), name
+        assert np.isfinite(result.center_of_mass[slot]).all(), name
+
+
+def _fits(robot, precision):
+    """Whether the robot's own numbers can be written in this precision."""
+    limit = np.finfo(precision).max
+    return max(np.abs(robot.positions).max(), np.abs(robot.velocities).max()) < limit
+
+
+@pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_neighbours_of_garbage_do_not_change_by_one_bit(precision, integrator):
+    robots, result = crowd(precision, integrator)
+    undisturbed = simulate(healthy(), precision, integrator)
+    for slot in range(1, len(robots), 2):
+        neighbour = (slot // 2) % len(healthy())
+        assert result.status[slot] == ws.Status.OK
+        assert bits(result, slot) == bits(undisturbed, neighbour)
+
+
+@pytest.mark.parametrize(
+    ("name", "reasons"),
+    [
+        ("too stiff for the step", {"NONFINITE", "TOO_FAST", "OVERSTRETCHED"}),
+        ("absurdly stiff", {"NONFINITE", "TOO_FAST", "OVERSTRETCHED"}),
+        ("one mass at 1e300 m/s", {"TOO_FAST", "NONFINITE"}),
+        ("one mass at 1e30 m/s", {"TOO_FAST"}),
+        ("one mass at 2 km/s", {"TOO_FAST"}),
+        ("every mass at 1e300 m/s", {"TOO_FAST", "NONFINITE"}),
+        ("breathing a kilometre", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
+        ("breathing 1e300 m", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
+        ("light as 1e-300 kg", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
+        ("springs of 1e300 m", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
+        ("isolated masses", {"OK"}),
+        ("one mass", {"OK"}),
+        ("duplicate springs", {"OK"}),
+    ],
+)
+def test_reason(name, reasons):
+    _, result = crowd("float64", "leapfrog")
+    slot = 2 * list(garbage()).index(name)
+    assert ws.Status(result.status[slot]).name in reasons
+    assert np.isnan(result.status_time[slot]) == (reasons == {"OK"})
+
+
+def test_status_is_an_integer_array_of_a_truthy_enum():
+    _, result = crowd("float64", "leapfrog")
+    assert result.status.dtype.kind == "i"
+    assert not ws.Status.OK
+    assert all(status for status in ws.Status if status is not ws.Status.OK)
+    stopped = result.status != ws.Status.OK
+    times = result.status_time
+    assert np.array_equal(np.isnan(times), ~stopped)
+    assert np.all((times[stopped] >= 0.0) & (times[stopped] <= DURATION))
+
+
+def test_stopped_robot_rests_where_it_was_last_good():
+    bad = garbage()["too stiff for the step"]
+    simulation = ws.Simulation(bad, ws.Scene(), dt=DT)
+    result = simulation.run(DURATION, fps=1 / DT)
+    assert result.status[0] != ws.Status.OK
+    positions = result.positions(0)
+    springs = bad.springs
+    lengths = np.linalg.norm(positions[springs[:, 1]] - positions[springs[:, 0]], axis=1)
+    assert lengths.max() <= ws.Limits().stretch * bad.lengths.max() * (1 + 1e-12)
+    stopped = result.times >= result.status_time[0]
+    assert stopped.any()
+    assert np.all(result.frames(0)[stopped] == positions)
+    # It stays there, with the same reason and time, when the run goes on.
+    later = simulation.run(DURATION)
+    assert np.array_equal(later.positions(0), positions)
+    assert later.status[0] == result.status[0]
+    assert later.status_time[0] == result.status_time[0]
+
+
+def test_stopped_at_the_end_of_a_run_stays_stopped():
+    # Whatever the moment at which a run ends, a reason once reported is not taken back.
+    bad = garbage()["too stiff for the step"]
+    for steps in range(1, 12):
+        simulation = ws.Simulation(bad, ws.Scene(), dt=DT)
+        first = simulation.run(steps * DT)
+        if first.status[0] != ws.Status.OK:
+            break
+    assert first.status[0] != ws.Status.OK
+    second = simulation.run(0.2)
+    assert second.status[0] == first.status[0]
+    assert second.status_time[0] == first.status_time[0]
+    assert np.array_equal(second.positions(0), first.positions(0))
+
+
+def test_limits_are_the_callers():
+    fast = loose([(0, 0, 1)], velocities=[(30.0, 0, 0)])
+    scene = ws.Scene(ground=None)
+    strict = ws.Simulation(fast, scene, dt=DT, limits=ws.Limits(speed=20.0)).run(0.1)
+    assert strict.status[0] == ws.Status.TOO_FAST
+    assert ws.Simulation(fast, scene, dt=DT).run(0.1).status[0] == ws.Status.OK
+    pulled = cube(rest_length=0.25)  # swells to more than twice its size
+    loose_limit = ws.Simulation(pulled, scene, dt=DT).run(0.2)
+    assert loose_limit.status[0] == ws.Status.OK
+    tight = ws.Simulation(pulled, scene, dt=DT, limits=ws.Limits(stretch=1.05)).run(0.2)
+    assert tight.status[0] == ws.Status.OVERSTRETCHED
+
+
+@pytest.mark.parametrize("field", ["speed", "stretch"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "fast"])
+def test_limits_refuse_nonsense(field, value):
+    with pytest.raises(ValueError, match=field):
+        ws.Limits(**{field: value})
+
+
+def test_spring_evaluations_leave_out_stopped_robots():
+    bad, good = garbage()["one mass at 1e300 m/s"], cube()
+    steps = round(DURATION / DT)
+    both = ws.Simulation([bad, good], ws.Scene(), dt=DT).run(DURATION)
+    assert both.spring_evaluations == good.n_springs * steps

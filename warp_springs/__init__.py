@@ -1,0 +1,61 @@
+"""Thousands of mass-spring soft robots stepped in parallel with NVIDIA Warp.
+
+    import warp_springs as ws
+
+    cube = ws.shapes.cube().moved((0, 0, 0.5)).spinning((3, -2, 4))
+    result = ws.Simulation([cube] * 1000, ws.Scene()).run(duration=2.0, fps=30, record=[0])
+    ws.export_usd(result, "cube.usdc")
+"""
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+
+from warp_springs import shapes
+from warp_springs.energy import Energy
+from warp_springs.result import Result
+from warp_springs.robot import Robot
+from warp_springs.scene import Ground, Scene, damping_rate
+from warp_springs.simulation import Simulation
+from warp_springs.stability import Limits, Status
+from warp_springs.variants import Variants
+
+__all__ = [
+    "Energy",
+    "Ground",
+    "Limits",
+    "Result",
+    "Robot",
+    "Scene",
+    "Simulation",
+    "Status",
+    "Variants",
+    "damping_rate",
+    "export_usd",
+    "plots",
+    "render",
+    "shapes",
+]
+
+try:
+    __version__ = version("warp-springs")
+except PackageNotFoundError:  # a source tree that was never installed
+    __version__ = "0+unknown"
+
+# Names whose modules need pxr, matplotlib or Pillow: loaded on first use.
+_LAZY = {
+    "export_usd": ("warp_springs.io.usd", "export_usd"),
+    "plots": ("warp_springs.view.plots", None),
+    "render": ("warp_springs.view.picture", "render"),
+}
+
+
+def __getattr__(name: str):
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _LAZY[name]
+    found = import_module(module)
+    return getattr(found, attribute) if attribute else found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

@@ -1,0 +1,308 @@
+"""Packing: robots in, one flat buffer for each quantity out.
+
+Robots are grouped by what their kernel must be able to do and by their topology; W robots of one
+topology share a bundle, one in each SIMD lane (see ``kernels.lanes``). A robot that is left over,
+because nobody shares its topology, becomes a bundle of width one. What a robot's kernel can do is
+decided by the robot alone, never by its neighbours, so its bits do not depend on its batch.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_springs.kernels.lanes import BUNDLE, Features, native_width
+from warp_springs.packing import (
+    MASS_FIELDS,
+    SPRING_FIELDS,
+    Strip,
+    aligned,
+    coefficients,
+    lane_major,
+    longest_springs,
+    sort_rows,
+)
+from warp_springs.robot import Robot
+from warp_springs.scene import Scene
+from warp_springs.variants import Variants
+
+__all__ = ["Batch", "Group", "Slots"]
+
+#: Steps of the contact flow within one step: no fewer, no more, if the caller does not choose.
+SUBSTEPS = (8, 64)
+
+#: Buffers that are packed, in the precision of the run unless a type is given.
+BUFFERS: dict[str, type | None] = {
+    "rows": np.int32,
+    "partners": np.int32,
+    "inverse_masses": None,
+    "coefficients": None,
+    "omegas": np.float64,
+    "reaches2": None,
+    "positions": None,
+    "velocities": None,
+    "oscillators": None,
+}
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Where each of N robots lives in the flat buffers; arrays of shape (N,).
+
+    Attributes:
+        bundle: Its bundle.
+        lane: Its lane in the bundle.
+        width: Lanes of the bundle.
+        state: Where the bundle starts in a buffer of positions.
+        first_lane: Where the bundle starts in a buffer with one value a lane.
+        masses: Number of masses M.
+        springs: Number of springs S.
+    """
+
+    bundle: np.ndarray
+    lane: np.ndarray
+    width: np.ndarray
+    state: np.ndarray
+    first_lane: np.ndarray
+    masses: np.ndarray
+    springs: np.ndarray
+
+    def unpack(self, buffer: np.ndarray, robot: int) -> np.ndarray:
+        """Block (M, 3) of one robot in a buffer of positions or velocities, float64."""
+        start, width = self.state[robot], self.width[robot]
+        block = buffer[start : start + 3 * self.masses[robot] * width]
+        return block.reshape(-1, 3, width)[:, :, self.lane[robot]].astype(np.float64)
+
+    def state_indices(self, robots: np.ndarray) -> np.ndarray:
+        """Where the positions of some robots are in their buffer, robot by robot, flat."""
+        counts = 3 * self.masses[robots]
+        component = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        start = np.repeat(self.state[robots] + self.lane[robots], counts)
+        return start + component * np.repeat(self.width[robots], counts)
+
+    def lane_indices(self, robots: np.ndarray | slice, columns: int) -> np.ndarray:
+        """Where ``columns`` values of some robots are in a buffer with so many a lane, (n, columns)."""
+        start = columns * self.first_lane[robots] + self.lane[robots]
+        return start[:, None] + np.arange(columns) * self.width[robots][:, None]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Consecutive bundles that one kernel steps.
+
+    Attributes:
+        features: What the kernel must be able to do.
+        first: First bundle.
+        count: Number of bundles.
+    """
+
+    features: Features
+    first: int
+    count: int
+
+
+class Batch:
+    """Flat buffers for N robots, ready for the kernels.
+
+    Args:
+        robots: The robots.
+        scene: Their world.
+        dt: Step [s].
+        precision: ``"float64"`` or ``"float32"``.
+        integrator: ``"leapfrog"`` or ``"euler"``.
+        contact_substeps: Steps of the contact flow within one step, or ``None`` to choose them.
+        stretch: Limit on the length of a spring, see ``Limits.stretch``.
+
+    Attributes:
+        slots: Where each robot lives.
+        groups: Runs of bundles, one kernel each.
+        bundles: The table of bundles, shape (B, len(BUNDLE)), int64.
+        arrays: The flat buffers of ``BUFFERS``, by name, on 64-byte boundaries.
+        substeps: Contact sub-steps of each robot, shape (N,).
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[Robot],
+        scene: Scene,
+        *,
+        dt: float,
+        precision: str,
+        integrator: str,
+        contact_substeps: int | None,
+        stretch: float,
+    ) -> None:
+        self._scene, self._dt, self._stretch = scene, dt, stretch
+        self._precision, self._integrator = precision, integrator
+        self._fixed_substeps = contact_substeps
+        self._parts: dict[str, list[np.ndarray]] = {name: [] for name in BUFFERS}
+        self._sizes = dict.fromkeys(BUFFERS, 0)
+        self._tables: list[np.ndarray] = []
+        self.groups: list[Group] = []
+        self.substeps = np.ones(len(robots), np.int64)
+        self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
+
+        # An absurd robot may overflow here; its status will say so once it is stepped.
+        with np.errstate(over="ignore", invalid="ignore"):
+            strips = self._strips(robots)
+            for width, actuated in sorted(strips, reverse=True):  # wide ones first: alignment
+                first = len(self)
+                for strip in strips[width, actuated]:
+                    self._pack(strip, width, actuated)
+                features = self._features(width, actuated)
+                self.groups.append(Group(features, first, len(self) - first))
+            self._finish()
+
+    def __len__(self) -> int:
+        """Number of bundles."""
+        return sum(map(len, self._tables)) if self._tables else 0
+
+    def _strips(self, robots: Sequence[Robot]) -> dict[tuple[int, bool], list[Strip]]:
+        """The robots by width of their bundles, by whether they actuate, and by topology."""
+        width = native_width(self._precision)
+        strips: dict[tuple[int, bool], list[Strip]] = defaultdict(list)
+        alone: dict[bool, list[int]] = defaultdict(list)
+        for ids, springs, fields in _cohorts(robots):
+            if fields is None:
+                robot = robots[int(ids[0])]
+                alone[robot.is_actuated].append(int(ids[0]))
+                continue
+            actuated = (fields["amplitude"] != 0.0).any(axis=1)
+            substeps = self._contact_substeps(fields["masses"].min(axis=1))
+            for kind in np.unique(np.stack([actuated, substeps]), axis=1).T:
+                members = np.flatnonzero((actuated == kind[0]) & (substeps == kind[1]))
+                # A robot that would be the only one of its bundle needs no other lanes.
+                if len(members) % width == 1:
+                    alone[bool(kind[0])].append(int(ids[members[-1]]))
+                    members = members[:-1]
+                if len(members):
+                    chosen = {name: values[members] for name, values in fields.items()}
+                    strips[width, bool(kind[0])].append(Strip.stacked(ids[members], springs, chosen))
+        for actuated, ids in alone.items():
+            strips[1, actuated].append(Strip.ragged(ids, [robots[i] for i in ids]))
+        return strips
+
+    def _contact_substeps(self, lightest: np.ndarray) -> np.ndarray:
+        """Contact sub-steps of robots whose lightest masses are given [kg].
+
+        A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
+        oscillation, sqrt(K_G / m) dt, below a sixteenth of a radian a sub-step.
+        """
+        if self._scene.ground is None or self._integrator == "euler":
+            return np.ones(len(lightest), np.int64)
+        if self._fixed_substeps is not None:
+            return np.full(len(lightest), self._fixed_substeps, np.int64)
+        phase = np.sqrt(self._scene.ground.stiffness / lightest) * self._dt
+        wanted = np.clip(16.0 * phase, *SUBSTEPS)
+        return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+
+    def _features(self, width: int, actuated: bool) -> Features:
+        scene, ground = self._scene, self._scene.ground
+        return Features(
+            precision=self._precision,
+            width=width,
+            actuated=actuated,
+            ground=ground is not None,
+            friction=ground.friction if ground and ground.has_friction else "none",
+            damping=scene.damping > 0.0,
+            drag=scene.drag > 0.0,
+            integrator=self._integrator,
+        )
+
+    def _pack(self, strip: Strip, width: int, actuated: bool) -> None:
+        """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
+        n, fields = len(strip.ids), strip.fields
+        lightest = np.minimum.reduceat(fields["masses"], np.cumsum(strip.masses) - strip.masses)
+        self.substeps[strip.ids] = self._contact_substeps(lightest)
+        within = np.arange(n)
+        self._slot[strip.ids, 0] = len(self) + within // width
+        self._slot[strip.ids, 1] = within % width
+        self._slot[strip.ids, 2] = width
+        self._tables.append(self._describe(strip, width, 4 if actuated else 2))
+
+        order, row, partner = sort_rows(strip)
+        longest = longest_springs(strip)
+        reach = np.where(longest > 0.0, self._stretch * longest, np.inf)
+        turn = fields["omega"] * self._dt
+        start = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
+        per_robot = {
+            "inverse_masses": 1.0 / fields["masses"],
+            "coefficients": coefficients(fields, order, actuated),
+            "omegas": fields["omega"],
+            "reaches2": reach**2,
+            "positions": fields["positions"],
+            "velocities": fields["velocities"],
+            "oscillators": start,
+        }
+        self._append("rows", row)
+        self._append("partners", partner)
+        for name, values in per_robot.items():
+            flat = lane_major(values, n, width) if strip.shared else values.ravel()
+            self._append(name, flat.astype(BUFFERS[name] or self._precision, copy=False))
+
+    def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
+        """The rows of the table of bundles for a strip."""
+        masses, counts = strip.masses[::width], strip.counts[::width]
+        blocks = {
+            "state": ("positions", 3 * masses * width),
+            "mass": ("inverse_masses", masses * width),
+            "spring": ("coefficients", columns * counts * width),
+            "lane": ("omegas", np.full(len(masses), width)),
+            "row": ("rows", 0 * masses if strip.shared else masses + 1),
+            "partner": ("partners", 0 * counts if strip.shared else counts),
+        }
+        table = {
+            column: self._sizes[buffer] + np.cumsum(sizes) - sizes
+            for column, (buffer, sizes) in blocks.items()
+        }
+        table |= {"masses": masses, "springs": counts}
+        table["substeps"] = self.substeps[strip.ids[::width]]
+        return np.stack([table[column] for column in BUNDLE], axis=1).astype(np.int64)
+
+    def _append(self, name: str, values: np.ndarray) -> None:
+        self._parts[name].append(values)
+        self._sizes[name] += values.size
+
+    def _finish(self) -> None:
+        """Join the parts and look up where each robot went."""
+        self.bundles = np.concatenate(self._tables)
+        self.arrays = {
+            name: aligned(parts, np.dtype(BUFFERS[name] or self._precision))
+            for name, parts in self._parts.items()
+        }
+        self._parts.clear()
+        bundle, lane, width = np.ascontiguousarray(self._slot.T)
+        description = dict(zip(BUNDLE, self.bundles[bundle].T, strict=True))
+        self.slots = Slots(
+            bundle=bundle,
+            lane=lane,
+            width=width,
+            state=description["state"],
+            first_lane=description["lane"],
+            masses=description["masses"],
+            springs=description["springs"],
+        )
+
+
+_Cohort = tuple[np.ndarray, np.ndarray, "dict[str, np.ndarray] | None"]
+
+
+def _cohorts(robots: Sequence[Robot]) -> Iterator[_Cohort]:
+    """Robots of one topology: their indices, springs, and stacked fields (None for one alone)."""
+    names = (*MASS_FIELDS, *SPRING_FIELDS, "omega")
+    if isinstance(robots, Variants) and len(robots) > 1:
+        fields = {name: robots.array(name) for name in names}
+        yield np.arange(len(robots)), robots.body.springs, fields
+        return
+    by_topology: dict[bytes, list[int]] = defaultdict(list)
+    for index, robot in enumerate(robots):
+        by_topology[robot.topology].append(index)
+    for members in by_topology.values():
+        chosen = [robots[i] for i in members]
+        fields = None
+        if len(members) > 1:
+            fields = {name: np.stack([getattr(r, name) for r in chosen]) for name in names}
+        yield np.array(members), chosen[0].springs, fields

@@ -1,0 +1,444 @@
+"""The layout for a CPU: one thread steps W robots of one topology, a robot in each SIMD lane.
+
+W robots that share a topology form a *bundle*. The innermost index of every array is the lane, so
+that each operation of the law is one instruction over W robots, and a bundle runs ALL its steps
+before the next one starts: its state stays in the first-level cache.
+
+Springs are sorted into rows by their lower mass. Row i gathers the force on mass i in registers and
+subtracts it from the partners, which all come later; so when row i ends mass i has its whole force,
+no later row reads its position, and it is moved at once.
+
+Every bundle is described by one row of the table ``BUNDLE``: where its blocks start in the flat
+buffers, how large they are. So one launch runs bundles of any topologies, and a robot's arithmetic
+depends neither on its lane nor on its neighbours.
+"""
+
+import functools
+from dataclasses import astuple, dataclass
+from typing import NamedTuple
+
+import warp as wp
+
+from warp_springs.kernels.law import CONSTANTS, LAW
+
+__all__ = ["BUNDLE", "CHECK_EVERY", "Features", "Kernels", "kernels", "native_width"]
+
+# Columns of the table of bundles. Offsets count elements of the flat buffers.
+BUNDLE = (
+    "state",  # positions, velocities and their last good copies: [3 M][W]
+    "mass",  # inverse masses: [M][W]
+    "spring",  # spring coefficients: [S][2 or 4][W]
+    "lane",  # one value a lane: [W]
+    "row",  # row starts, M + 1 of them, counted from 0
+    "partner",  # the higher mass of each spring, S of them
+    "masses",
+    "springs",
+    "substeps",  # of the contact flow
+)
+
+# Health is checked, and the oscillators are set anew, every so many steps, counted from the start
+# of the simulation: 64 steps cost about 0.5 % and let the rotation err by less than 1e-14.
+CHECK_EVERY = 64
+
+COMPILER_OPTIONS = {
+    "enable_backward": False,
+    "optimization_level": 3,
+    "cpu_compiler_flags": "-march=native -mprefer-vector-width=512",
+}
+
+
+@dataclass(frozen=True)
+class Features:
+    """What a kernel is compiled for; everything else is left out of it."""
+
+    precision: str
+    width: int
+    actuated: bool
+    ground: bool
+    friction: str  # "none", "coulomb", "course"
+    damping: bool
+    drag: bool
+    integrator: str
+
+    @property
+    def name(self) -> str:
+        """A name for the module, with everything the code depends on."""
+        return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
+
+
+class Kernels(NamedTuple):
+    """The two kernels of a group: stepping, and looking without touching."""
+
+    advance: wp.Kernel
+    observe: wp.Kernel
+
+
+@wp.func_native("""
+#if defined(__AVX512F__)
+return 64;
+#elif defined(__AVX__)
+return 32;
+#else
+return 16;
+#endif
+""")
+def register_bytes() -> int: ...
+
+
+@wp.kernel(module="warp_springs_registers", enable_backward=False)
+def _measure(
+    # outputs
+    size: wp.array(dtype=wp.int32),
+):
+    size[0] = register_bytes()
+
+
+@functools.cache
+def native_width(precision: str) -> int:
+    """Robots a bundle: the lanes of one vector register, as Warp's compiler targets them."""
+    size = wp.zeros(1, dtype=wp.int32, device="cpu")
+    wp.launch(_measure, 1, outputs=[size], device="cpu")
+    return int(size.numpy()[0]) // (4 if precision == "float32" else 8)
+
+
+def _dialect(features: Features) -> str:
+    scalar, integer, size = (
+        ("float", "int", 4) if features.precision == "float32" else ("double", "long long", 8)
+    )
+    flags = {
+        "ACTUATED": features.actuated,
+        "GROUND": features.ground,
+        "COULOMB": features.friction == "coulomb",
+        "COURSE": features.friction == "course",
+        "DAMPING": features.damping,
+        "DRAG": features.drag,
+        "EULER": features.integrator == "euler",
+    }
+    return f"""
+    #pragma clang fp contract(on)
+    typedef {scalar} scalar;
+    typedef {integer} integer;
+    typedef scalar real __attribute__((vector_size({size * features.width})));
+    typedef integer mask __attribute__((vector_size({size * features.width})));
+    const int W = {features.width};
+    const scalar TINY = {"1e-30f" if features.precision == "float32" else "1e-200"};
+    const real zero = {{}};
+    {"".join(f"const bool {name} = {str(on).lower()};" for name, on in flags.items())}
+    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
+    auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
+    auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
+    auto inverse_root = [](real a) -> real {{ return scalar(1) / __builtin_elementwise_sqrt(a); }};
+    """ + "".join(
+        f"const scalar {name} = scalar(constants.data[{i}]);" for i, name in enumerate(CONSTANTS)
+    )
+
+
+# What both kernels need: the blocks of one bundle, one row of springs, its health.
+_BUNDLE = "".join(
+    f"const int64_t {column}_ = bundles.data[bundle * {len(BUNDLE)} + {i}];"
+    for i, column in enumerate(BUNDLE)
+) + r"""
+const int M = (int)masses_, S = (int)springs_, substeps = (int)substeps_;
+Vec* const x = (Vec*)(positions.data + state_);
+Vec* const v = (Vec*)(velocities.data + state_);
+Vec* const good_x = (Vec*)(good_positions.data + state_);
+Vec* const good_v = (Vec*)(good_velocities.data + state_);
+const real* const w = (const real*)(inverse_masses.data + mass_);
+const real* const p = (const real*)(coefficients.data + spring_);
+const int* const row = rows.data + row_;
+const int* const partner = partners.data + partner_;
+real& sine = *(real*)(oscillators.data + 4 * lane_);
+real& cosine = *(real*)(oscillators.data + 4 * lane_ + W);
+const real turn_cosine = *(const real*)(oscillators.data + 4 * lane_ + 2 * W);
+const real turn_sine = *(const real*)(oscillators.data + 4 * lane_ + 3 * W);
+const real reach2 = *(const real*)(reaches2.data + lane_);
+int* const state = states.data + lane_;
+int* const state_step = state_steps.data + lane_;
+Vec* const F = (Vec*)(forces.data + scratch);
+const int K = ACTUATED ? 4 : 2;
+
+auto stiffness = [=](int s) -> real { return p[K * s]; };
+auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
+    return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
+};
+// The whole force on mass i; forces on later masses are left in F.
+auto row_force = [=](int i, real si, real co) __attribute__((always_inline)) -> Vec {
+    const Vec a = x[i];
+    Vec f = F[i];
+    F[i] = Vec{zero, zero, zero};
+    for (int s = row[i]; s < row[i + 1]; ++s) {
+        const int j = partner[s];
+        real dx = x[j].x - a.x, dy = x[j].y - a.y, dz = x[j].z - a.z;
+        real pull = spring_pull(squared_length(dx, dy, dz), stiffness(s),
+                                stiffness_times_rest(s, si, co));
+        real px = pull * dx, py = pull * dy, pz = pull * dz;
+        f.x += px; f.y += py; f.z += pz;
+        F[j].x -= px; F[j].y -= py; F[j].z -= pz;
+    }
+    return f;
+};
+// The reasons, by lane, why a robot must be stopped now: 1 not finite, 2 overstretched, 3 too fast
+// (the values of warp_springs.Status), 0 none.
+auto diagnose = [=]() -> mask {
+    const real limit2 = zero + speed_limit * speed_limit;
+    real poison = zero;
+    mask fast = zero > zero, stretched = fast;
+    for (int i = 0; i < M; ++i) {
+        const Vec a = x[i], u = v[i];
+        poison += (a.x + a.y + a.z + u.x + u.y + u.z) * scalar(0);
+        fast |= u.x * u.x + u.y * u.y + u.z * u.z > limit2;
+        for (int s = row[i]; s < row[i + 1]; ++s) {
+            const Vec b = x[partner[s]];
+            stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
+        }
+    }
+    const mask finite = poison == zero;
+    return finite ? (fast ? (mask{} + 3) : (stretched ? (mask{} + 2) : mask{})) : (mask{} + 1);
+};
+auto stopped_lanes = [=]() -> mask {
+    mask stopped;
+    for (int l = 0; l < W; ++l) stopped[l] = state[l] != 0 ? -1 : 0;
+    return stopped;
+};
+"""
+
+_ADVANCE = r"""
+// Stops the robots that went wrong since the last check where they were last good.
+auto check = [&](int n) {
+    mask stopped = stopped_lanes();
+    const mask reason = diagnose() & ~stopped;
+    if (any(reason != 0)) {
+        for (int l = 0; l < W; ++l)
+            if (reason[l] != 0) { state[l] = (int)reason[l]; state_step[l] = n; }
+        stopped = stopped_lanes();
+    }
+    if (any(stopped)) {
+        for (int i = 0; i < M; ++i) {
+            const Vec a = x[i], b = good_x[i], c = v[i], d = good_v[i];
+            x[i] = good_x[i] = Vec{select(stopped, b.x, a.x), select(stopped, b.y, a.y),
+                                   select(stopped, b.z, a.z)};
+            v[i] = good_v[i] = Vec{select(stopped, d.x, c.x), select(stopped, d.y, c.y),
+                                   select(stopped, d.z, c.z)};
+        }
+    } else {
+        for (int i = 0; i < M; ++i) { good_x[i] = x[i]; good_v[i] = v[i]; }
+    }
+};
+auto set_oscillators = [&](int n) {
+    for (int l = 0; l < W; ++l) {
+        const double angle = omegas.data[lane_ + l] * (double(n) * constants.data[0]);
+        sine[l] = scalar(::sin(angle)); cosine[l] = scalar(::cos(angle));
+    }
+};
+
+for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
+for (int n = first_step; n < last_step; ++n) {
+    if (n % CHECK_EVERY == 0) {
+        check(n);
+        if (ACTUATED) set_oscillators(n);
+    }
+    const bool first = n == 0;
+    const scalar kick = first ? dt * scalar(0.5) : dt;
+    const real si = sine, co = cosine;
+    for (int i = 0; i < M; ++i) {
+        const Vec f = row_force(i, si, co);
+        Vec a = x[i], u = v[i];
+        if (EULER) euler_step(a, u, f, w[i]);
+        else {
+            leapfrog_kick(u, f, w[i], a.z, !first, kick, true);
+            leapfrog_drift(a, u, w[i], substeps);
+        }
+        x[i] = a; v[i] = u;
+    }
+    if (ACTUATED) {
+        sine = si * turn_cosine + co * turn_sine;
+        cosine = co * turn_cosine - si * turn_sine;
+    }
+}
+"""
+
+_OBSERVE = r"""
+Vec* const seen_x = (Vec*)(seen_positions.data + state_);
+Vec* const seen_v = (Vec*)(seen_velocities.data + state_);
+real* const com = (real*)(seen_centers.data + 3 * lane_);
+real* const energy = (real*)(seen_energies.data + 4 * lane_);
+int* const seen_state = seen_states.data + lane_;
+int* const seen_step = seen_state_steps.data + lane_;
+
+const mask before = stopped_lanes();
+const mask reason = diagnose() & ~before;
+const mask stopped = before | (reason != 0);
+for (int l = 0; l < W; ++l) {
+    seen_state[l] = state[l] != 0 ? state[l] : (int)reason[l];
+    seen_step[l] = state[l] != 0 ? state_step[l] : reason[l] != 0 ? step : -1;
+}
+
+real total_mass = zero, cx = zero, cy = zero, cz = zero;
+real kinetic = zero, gravity = zero, springs = zero, ground = zero;
+for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
+for (int i = 0; i < M; ++i) {
+    const Vec f = row_force(i, sine, cosine);
+    Vec a = x[i], u = v[i];
+    const Vec b = good_x[i], good = good_v[i];
+    if (!EULER && step > 0) leapfrog_synchronise(u, f, w[i], a.z);
+    a = Vec{select(stopped, b.x, a.x), select(stopped, b.y, a.y), select(stopped, b.z, a.z)};
+    u = Vec{select(stopped, good.x, u.x), select(stopped, good.y, u.y),
+            select(stopped, good.z, u.z)};
+    seen_x[i] = a; seen_v[i] = u;
+    const real m = (zero + scalar(1)) / w[i];
+    total_mass += m;
+    cx += m * a.x; cy += m * a.y; cz += m * a.z;
+    kinetic += m * (u.x * u.x + u.y * u.y + u.z * u.z) * scalar(0.5);
+    gravity -= m * (a.x * gravity_x + a.y * gravity_y + a.z * gravity_z);
+    if (GROUND) ground += ground_force(a.z) * a.z * scalar(-0.5);
+}
+com[0] = cx / total_mass; com[1] = cy / total_mass; com[2] = cz / total_mass;
+for (int i = 0; energy_wanted && i < M; ++i) {
+    const Vec a = seen_x[i];
+    for (int s = row[i]; s < row[i + 1]; ++s) {
+        const Vec b = seen_x[partner[s]];
+        springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z), stiffness(s),
+                                 stiffness_times_rest(s, sine, cosine));
+    }
+}
+energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;
+"""
+
+
+@functools.cache
+def kernels(features: Features) -> Kernels:
+    """Compile-time specialised kernels; the first use of a specialisation compiles it (seconds)."""
+    real = wp.float32 if features.precision == "float32" else wp.float64
+    common = _dialect(features) + LAW + f"const int CHECK_EVERY = {CHECK_EVERY};" + _BUNDLE
+    # A named module of its own: compiling one specialisation leaves the others alone.
+    module = wp.get_module(features.name)
+    wp.set_module_options(COMPILER_OPTIONS, module)
+
+    @wp.func_native(common + _ADVANCE)
+    def advance_bundle(
+        bundle: int,
+        bundles: wp.array(dtype=wp.int64),
+        constants: wp.array(dtype=wp.float64),
+        rows: wp.array(dtype=wp.int32),
+        partners: wp.array(dtype=wp.int32),
+        inverse_masses: wp.array(dtype=real),
+        coefficients: wp.array(dtype=real),
+        omegas: wp.array(dtype=wp.float64),
+        reaches2: wp.array(dtype=real),
+        positions: wp.array(dtype=real),
+        velocities: wp.array(dtype=real),
+        good_positions: wp.array(dtype=real),
+        good_velocities: wp.array(dtype=real),
+        oscillators: wp.array(dtype=real),
+        states: wp.array(dtype=wp.int32),
+        state_steps: wp.array(dtype=wp.int32),
+        forces: wp.array(dtype=real),
+        scratch: wp.int64,
+        first_step: int,
+        last_step: int,
+    ): ...
+
+    @wp.func_native(common + _OBSERVE)
+    def observe_bundle(
+        bundle: int,
+        bundles: wp.array(dtype=wp.int64),
+        constants: wp.array(dtype=wp.float64),
+        rows: wp.array(dtype=wp.int32),
+        partners: wp.array(dtype=wp.int32),
+        inverse_masses: wp.array(dtype=real),
+        coefficients: wp.array(dtype=real),
+        reaches2: wp.array(dtype=real),
+        positions: wp.array(dtype=real),
+        velocities: wp.array(dtype=real),
+        good_positions: wp.array(dtype=real),
+        good_velocities: wp.array(dtype=real),
+        oscillators: wp.array(dtype=real),
+        states: wp.array(dtype=wp.int32),
+        state_steps: wp.array(dtype=wp.int32),
+        forces: wp.array(dtype=real),
+        scratch: wp.int64,
+        step: int,
+        energy_wanted: bool,
+        seen_positions: wp.array(dtype=real),
+        seen_velocities: wp.array(dtype=real),
+        seen_centers: wp.array(dtype=real),
+        seen_energies: wp.array(dtype=real),
+        seen_states: wp.array(dtype=wp.int32),
+        seen_state_steps: wp.array(dtype=wp.int32),
+    ): ...
+
+    @wp.kernel(module=module)
+    def advance(
+        # model
+        bundles: wp.array(dtype=wp.int64),
+        constants: wp.array(dtype=wp.float64),
+        rows: wp.array(dtype=wp.int32),
+        partners: wp.array(dtype=wp.int32),
+        inverse_masses: wp.array(dtype=real),
+        coefficients: wp.array(dtype=real),
+        omegas: wp.array(dtype=wp.float64),
+        reaches2: wp.array(dtype=real),
+        # state
+        positions: wp.array(dtype=real),
+        velocities: wp.array(dtype=real),
+        good_positions: wp.array(dtype=real),
+        good_velocities: wp.array(dtype=real),
+        oscillators: wp.array(dtype=real),
+        states: wp.array(dtype=wp.int32),
+        state_steps: wp.array(dtype=wp.int32),
+        # scratch
+        forces: wp.array(dtype=real),
+        scratch: wp.int64,
+        # scalars
+        first_bundle: int,
+        first_step: int,
+        last_step: int,
+    ):
+        advance_bundle(
+            first_bundle + wp.tid(), bundles, constants, rows, partners, inverse_masses,
+            coefficients, omegas, reaches2, positions, velocities, good_positions,
+            good_velocities, oscillators, states, state_steps, forces, scratch,
+            first_step, last_step,
+        )  # fmt: skip
+
+    @wp.kernel(module=module)
+    def observe(
+        # model
+        bundles: wp.array(dtype=wp.int64),
+        constants: wp.array(dtype=wp.float64),
+        rows: wp.array(dtype=wp.int32),
+        partners: wp.array(dtype=wp.int32),
+        inverse_masses: wp.array(dtype=real),
+        coefficients: wp.array(dtype=real),
+        reaches2: wp.array(dtype=real),
+        # state
+        positions: wp.array(dtype=real),
+        velocities: wp.array(dtype=real),
+        good_positions: wp.array(dtype=real),
+        good_velocities: wp.array(dtype=real),
+        oscillators: wp.array(dtype=real),
+        states: wp.array(dtype=wp.int32),
+        state_steps: wp.array(dtype=wp.int32),
+        # scratch
+        forces: wp.array(dtype=real),
+        scratch: wp.int64,
+        # scalars
+        which: wp.array(dtype=wp.int32),
+        step: int,
+        energy_wanted: bool,
+        # outputs
+        seen_positions: wp.array(dtype=real),
+        seen_velocities: wp.array(dtype=real),
+        seen_centers: wp.array(dtype=real),
+        seen_energies: wp.array(dtype=real),
+        seen_states: wp.array(dtype=wp.int32),
+        seen_state_steps: wp.array(dtype=wp.int32),
+    ):
+        observe_bundle(
+            which[wp.tid()], bundles, constants, rows, partners, inverse_masses, coefficients,
+            reaches2, positions, velocities, good_positions, good_velocities, oscillators,
+            states, state_steps, forces, scratch, step, energy_wanted, seen_positions,
+            seen_velocities, seen_centers, seen_energies, seen_states, seen_state_steps,
+        )  # fmt: skip
+
+    return Kernels(advance, observe)

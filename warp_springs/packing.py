@@ -1,0 +1,147 @@
+"""Robots laid end to end, and the flat arrays the kernels read, as pure NumPy functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_springs.robot import Robot
+
+__all__ = ["Strip", "aligned", "coefficients", "lane_major", "longest_springs", "sort_rows"]
+
+MASS_FIELDS = ("masses", "positions", "velocities")
+SPRING_FIELDS = ("stiffness", "rest_length", "amplitude", "phase")
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Robots that one kernel steps in bundles of one width, their arrays laid end to end.
+
+    Attributes:
+        ids: Index of each robot in the batch, shape (n,).
+        masses: Number of masses of each robot, shape (n,).
+        counts: Number of springs of each robot, shape (n,).
+        springs: Ends of the springs, counted within the robot; of all robots (sum of counts, 2),
+            or, where they share one topology, of one of them (S, 2).
+        shared: Whether all robots share that topology.
+        fields: Flat arrays over all masses or all springs, and ``omega`` (n,).
+    """
+
+    ids: np.ndarray
+    masses: np.ndarray
+    counts: np.ndarray
+    springs: np.ndarray
+    shared: bool
+    fields: dict[str, np.ndarray]
+
+    @classmethod
+    def stacked(cls, ids: np.ndarray, springs: np.ndarray, fields: dict[str, np.ndarray]) -> Strip:
+        """Robots of one topology, from arrays with axis 0 the robot."""
+        n, masses = fields["masses"].shape
+        flat = {name: values.reshape(-1, *values.shape[2:]) for name, values in fields.items()}
+        return cls(ids, np.full(n, masses), np.full(n, len(springs)), springs, True, flat)
+
+    @classmethod
+    def ragged(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
+        """Robots of any topologies."""
+        fields = {
+            name: np.concatenate([getattr(robot, name) for robot in robots])
+            for name in MASS_FIELDS + SPRING_FIELDS
+        }
+        fields["omega"] = np.array([robot.omega for robot in robots])
+        masses = np.array([robot.n_masses for robot in robots])
+        counts = np.array([robot.n_springs for robot in robots])
+        springs = np.concatenate([robot.springs for robot in robots])
+        return cls(np.asarray(ids), masses, counts, springs, False, fields)
+
+    @property
+    def owner(self) -> np.ndarray:
+        """The robot (0 to n - 1) of each spring of all robots."""
+        return np.repeat(np.arange(len(self.ids)), self.counts)
+
+    @property
+    def all_springs(self) -> np.ndarray:
+        """Ends of the springs of all robots, counted within the robot, (sum of counts, 2)."""
+        return np.tile(self.springs, (len(self.ids), 1)) if self.shared else self.springs
+
+
+def sort_rows(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Springs in rows by their lower mass.
+
+    Returns:
+        ``order``: all springs of all robots, sorted into rows, robot by robot;
+        ``row``: for each topology its M + 1 row starts, counted from 0;
+        ``partner``: for each topology the higher mass of each sorted spring.
+    """
+    topologies = 1 if strip.shared else len(strip.ids)
+    masses, counts = strip.masses[:topologies], strip.counts[:topologies]
+    mass_start, spring_start = np.cumsum(masses) - masses, np.cumsum(counts) - counts
+    lower, higher = np.sort(strip.springs, axis=1).T
+    lower = lower + np.repeat(mass_start, counts)
+    order = np.argsort(lower, kind="stable")
+    partner = higher[order]
+
+    ends = np.cumsum(np.bincount(lower, minlength=masses.sum()))  # where the row of a mass ends
+    row = np.zeros((masses + 1).sum(), np.int64)
+    inner = np.ones(len(row), bool)
+    inner[mass_start + np.arange(topologies)] = False
+    row[inner] = ends - np.repeat(spring_start, masses)
+    if strip.shared:
+        shift = np.arange(len(strip.ids)) * len(order)
+        order = (order + shift[:, None]).ravel()
+    return order, row.astype(np.int32), partner.astype(np.int32)
+
+
+def coefficients(fields: dict[str, np.ndarray], order: np.ndarray, actuated: bool) -> np.ndarray:
+    """Coefficients of the sorted springs: k and q = k L0, shape (total, 2), or, if they breathe,
+    k, qa, qs, qc with q(t) = qa + qs sin(wt) + qc cos(wt), shape (total, 4).
+
+    From L0(t) = a + b sin(wt + c) = a + (b cos c) sin(wt) + (b sin c) cos(wt).
+    """
+    k, rest = fields["stiffness"][order], fields["rest_length"][order]
+    columns = [k, k * rest]
+    if actuated:
+        b, c = fields["amplitude"][order], fields["phase"][order]
+        columns += [k * b * np.cos(c), k * b * np.sin(c)]
+    return np.stack(columns, axis=1)
+
+
+def longest_springs(strip: Strip) -> np.ndarray:
+    """The longest each robot's springs are meant to be [m], shape (n,); 0 without springs.
+
+    The largest of the initial lengths and of the rest lengths plus amplitudes.
+    """
+    owner, fields = strip.owner, strip.fields
+    ends = strip.all_springs + (np.cumsum(strip.masses) - strip.masses)[owner, None]
+    positions = fields["positions"]
+    lengths = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
+    longest = np.zeros(len(strip.ids))
+    np.maximum.at(
+        longest, owner, np.maximum(lengths, fields["rest_length"] + np.abs(fields["amplitude"]))
+    )
+    return longest
+
+
+def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:
+    """Flat values of ``robots`` equal robots with the lane as the innermost index.
+
+    The last robot fills the lanes that are left over in the last bundle.
+    """
+    block = values.reshape(robots, -1)
+    if width == 1:
+        return block.ravel()
+    lanes = np.minimum(np.arange(-(-robots // width) * width), robots - 1)
+    return block[lanes].reshape(-1, width, block.shape[1]).transpose(0, 2, 1).ravel()
+
+
+def aligned(parts: Sequence[np.ndarray], dtype: np.dtype) -> np.ndarray:
+    """The parts joined in one array that starts on a 64-byte boundary, as vector loads need."""
+    count = sum(part.size for part in parts)
+    buffer = np.empty(count * dtype.itemsize + 64, np.uint8)
+    start = -buffer.ctypes.data % 64
+    array = buffer[start : start + count * dtype.itemsize].view(dtype)
+    if parts:
+        np.concatenate(parts, out=array, casting="same_kind")
+    return array

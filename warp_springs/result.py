@@ -1,0 +1,96 @@
+"""What a run hands back: plain NumPy arrays, axis 0 the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_springs.energy import Energy
+from warp_springs.scene import Scene
+
+if TYPE_CHECKING:
+    from warp_springs.batch import Slots
+    from warp_springs.robot import Robot
+
+__all__ = ["Result"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """The end of a run of N robots, and the frames that were recorded on the way.
+
+    Attributes:
+        robots: The N robots as they were given to the simulation.
+        scene: Their world.
+        dt: Step [s].
+        precision: ``"float64"`` or ``"float32"``.
+        integrator: ``"leapfrog"`` or ``"euler"``.
+        device: Where the run took place.
+        start_time: Time at the start of this run [s].
+        end_time: Time at its end [s].
+        steps: Steps of this run.
+        status: Why each robot was stopped (0: it was not), values of ``Status``, shape (N,).
+        status_time: When [s], NaN for the healthy, shape (N,). Health is looked at every
+            64 steps; a stopped robot stays where it was found healthy for the last time.
+        center_of_mass: Centre of mass at the end [m], shape (N, 3).
+        times: Times of the F recorded frames [s], shape (F,); empty if none were.
+        recorded: Indices of the recorded robots.
+        energy: Energies of all robots at the recorded times, or ``None``.
+        spring_evaluations: Spring forces computed for robots that were not stopped.
+        wall_time: Seconds that the run took.
+    """
+
+    robots: Sequence[Robot]
+    scene: Scene
+    dt: float
+    precision: str
+    integrator: str
+    device: str
+    start_time: float
+    end_time: float
+    steps: int
+    status: np.ndarray
+    status_time: np.ndarray
+    center_of_mass: np.ndarray
+    times: np.ndarray
+    recorded: tuple[int, ...]
+    energy: Energy | None
+    spring_evaluations: int
+    wall_time: float
+    _slots: Slots = field(repr=False)
+    _positions: np.ndarray = field(repr=False)
+    _velocities: np.ndarray = field(repr=False)
+    _frames: Mapping[int, np.ndarray] = field(repr=False)
+
+    def __len__(self) -> int:
+        """Number of robots N."""
+        return len(self.robots)
+
+    def positions(self, robot: int) -> np.ndarray:
+        """Positions of a robot's masses at the end [m], shape (M, 3), float64."""
+        return self._slots.unpack(self._positions, self._index(robot))
+
+    def velocities(self, robot: int) -> np.ndarray:
+        """Velocities of a robot's masses at the end [m/s], shape (M, 3), float64."""
+        return self._slots.unpack(self._velocities, self._index(robot))
+
+    def frames(self, robot: int) -> np.ndarray:
+        """Recorded positions of a robot [m], shape (F, M, 3), float64.
+
+        Raises:
+            ValueError: The robot was not recorded in this run.
+        """
+        robot = self._index(robot)
+        if robot not in self._frames:
+            known = f"recorded: {list(self.recorded[:8])}" if self.recorded else "none was"
+            raise ValueError(f"frames: robot {robot} was not recorded in this run ({known})")
+        return self._frames[robot]
+
+    def _index(self, robot: int) -> int:
+        count = len(self.robots)
+        if not -count <= robot < count:
+            raise IndexError(f"robot: got {robot}, expected an index below {count}")
+        return int(robot) % count

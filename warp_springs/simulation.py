@@ -1,0 +1,256 @@
+"""Simulation: robots are packed once, then run in pieces of any length."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from warp_springs.batch import Batch
+from warp_springs.checks import check_choice, check_number
+from warp_springs.energy import Energy
+from warp_springs.kernels.law import constants
+from warp_springs.packing import aligned
+from warp_springs.result import Result
+from warp_springs.robot import Robot
+from warp_springs.scene import Scene
+from warp_springs.slices import Tape, cut, run_all
+from warp_springs.stability import Limits
+from warp_springs.variants import Variants
+
+__all__ = ["Simulation"]
+
+
+class Simulation:
+    """N robots in one packed batch, each in a world of its own.
+
+    Args:
+        robots: A ``Robot``, a sequence of them, or ``Variants`` of one body.
+        scene: The world, the same for all; ``Scene()`` by default.
+        dt: Step [s].
+        device: ``"cpu"``.
+        precision: ``"float64"``, or ``"float32"`` for about twice the speed.
+        integrator: ``"leapfrog"`` (kick - drift - kick, second order; gravity and the ground are
+            sub-cycled in the drift) or ``"euler"`` (symplectic Euler, the classroom's method).
+        contact_substeps: Steps of the contact flow within a leapfrog step; by default chosen for
+            each robot from the ground's stiffness, its lightest mass and dt.
+        threads: CPU threads, by default as many as this process may use.
+        limits: What stops a robot; ``Limits()`` by default.
+
+    Raises:
+        ValueError: An argument is out of range, or there is no robot.
+        TypeError: ``robots``, ``scene`` or ``limits`` is something else.
+
+    The first use of a combination of features compiles its kernels; they are cached on disk.
+    """
+
+    def __init__(
+        self,
+        robots: Robot | Sequence[Robot],
+        scene: Scene | None = None,
+        dt: float = 1e-4,
+        *,
+        device: str = "cpu",
+        precision: Literal["float64", "float32"] = "float64",
+        integrator: Literal["leapfrog", "euler"] = "leapfrog",
+        contact_substeps: int | None = None,
+        threads: int | None = None,
+        limits: Limits | None = None,
+    ) -> None:
+        self.robots = _check_robots(robots)
+        self.scene = _check_type("scene", Scene() if scene is None else scene, Scene)
+        self.limits = _check_type("limits", Limits() if limits is None else limits, Limits)
+        check_number("dt", dt, above=0.0)
+        check_choice("device", str(device), ("cpu",))
+        check_choice("precision", precision, ("float64", "float32"))
+        check_choice("integrator", integrator, ("leapfrog", "euler"))
+        if contact_substeps is not None:
+            _check_count("contact_substeps", contact_substeps)
+            if integrator == "euler":
+                raise ValueError("contact_substeps: only 'leapfrog' has them, got 'euler'")
+        if threads is not None:
+            _check_count("threads", threads)
+        self.dt, self.device = float(dt), str(device)
+        self.precision, self.integrator = precision, integrator
+        self.threads = threads or _usable_cores()
+        self._step = 0
+        self._interrupted = False
+        self._batch = Batch(
+            self.robots,
+            self.scene,
+            dt=self.dt,
+            precision=precision,
+            integrator=integrator,
+            contact_substeps=contact_substeps,
+            stretch=self.limits.stretch,
+        )
+        self._buffers = self._allocate()
+        self._slices = cut(self._batch, self._buffers, self.threads)
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        return self._step * self.dt
+
+    @property
+    def contact_substeps(self) -> np.ndarray:
+        """Contact sub-steps of each robot, shape (N,); 1 without a ground and for ``"euler"``."""
+        return self._batch.substeps.copy()
+
+    def run(
+        self,
+        duration: float,
+        fps: float | None = None,
+        record: Iterable[int] | None = None,
+        energy: bool = False,
+        progress: Callable[[float], None] | None = None,
+    ) -> Result:
+        """Step all robots for ``duration`` seconds; a second call continues where this one ends.
+
+        Args:
+            duration: Simulated time [s], rounded to whole steps.
+            fps: Frames to record per simulated second, from the start on; each is taken at the
+                step that is nearest. Neither frames nor the cutting of a run into several change
+                the motion by a bit.
+            record: Robots whose frames are kept; by default, with ``fps``, all.
+            energy: Whether to compute energies at the frames (without ``fps``: at start and end).
+            progress: Called now and then with the fraction that is done, 0 to 1.
+
+        Raises:
+            ValueError: ``duration`` or ``fps`` is not positive, or ``record`` is out of range or
+                given without ``fps``.
+            RuntimeError: An earlier run was interrupted.
+        """
+        check_number("duration", duration, above=0.0)
+        steps = round(duration / self.dt)
+        if steps < 1:
+            raise ValueError(f"duration: got {duration!r}, expected a step ({self.dt} s) or more")
+        recorded = self._check_record(record, fps)
+        if self._interrupted:
+            raise RuntimeError("this simulation was interrupted during a run; make a new one")
+        first, last = self._step, self._step + steps
+        frame_steps = self._frame_steps(first, last, fps, energy)
+        tapes = [Tape(s, self._batch.slots, recorded, frame_steps, energy) for s in self._slices]
+
+        started = time.perf_counter()
+        try:
+            run_all(tapes, first, last, self.threads, progress)
+        except BaseException:
+            self._interrupted = True
+            raise
+        self._step = last
+        return self._result(first, frame_steps, recorded, tapes, time.perf_counter() - started)
+
+    def _allocate(self) -> dict[str, np.ndarray]:
+        """Every buffer of the kernels by name: the packed ones, and what is written."""
+        batch, real = self._batch, np.dtype(self.precision)
+        buffers = batch.arrays | {
+            "bundles": batch.bundles.ravel(),
+            "constants": np.array(constants(self.scene, self.dt, self.limits.speed)),
+        }
+        for name in ("positions", "velocities"):
+            buffers[f"good_{name}"] = aligned([buffers[name]], real)
+            buffers[f"seen_{name}"] = aligned([buffers[name]], real)
+        lanes = len(buffers["omegas"])
+        buffers["seen_centers"] = aligned([np.zeros(3 * lanes, real)], real)
+        buffers["seen_energies"] = aligned([np.zeros(4 * lanes, real)], real)
+        for name in ("states", "state_steps", "seen_states", "seen_state_steps"):
+            buffers[name] = np.zeros(lanes, np.int32)
+        return buffers
+
+    def _check_record(self, record: Iterable[int] | None, fps: float | None) -> np.ndarray:
+        count = len(self.robots)
+        if fps is None:
+            if record is not None:
+                raise ValueError("record: frames are taken at a rate; give fps as well")
+            return np.zeros(0, np.int64)
+        check_number("fps", fps, above=0.0)
+        robots = list(range(count) if record is None else record)
+        for robot in robots:
+            if not isinstance(robot, (int, np.integer)) or not -count <= robot < count:
+                raise ValueError(f"record: got {robot!r}, expected indices of {count} robots")
+        return np.unique(np.asarray(robots, np.int64) % count)
+
+    def _frame_steps(self, first: int, last: int, fps: float | None, energy: bool) -> list[int]:
+        """Steps at which frames are taken: a frame every 1 / fps seconds, from the start on."""
+        if fps is None:
+            return [first, last] if energy else []
+        count = int((last - first) * self.dt * fps + 1e-6) + 1
+        steps = first + np.rint(np.arange(count) / (fps * self.dt)).astype(np.int64)
+        return np.minimum(steps, last).tolist()
+
+    def _result(self, first, frame_steps, recorded, tapes, wall_time: float) -> Result:
+        slots, buffers = self._batch.slots, self._buffers
+        lanes = slots.lane_indices(slice(None), 1)[:, 0]
+        centers = slots.lane_indices(slice(None), 3)
+        status = buffers["seen_states"][lanes].astype(np.int64)
+        stopped_at = buffers["seen_state_steps"][lanes].astype(np.int64)
+        until = np.where(status == 0, self._step, np.clip(stopped_at, first, self._step))
+        return Result(
+            robots=self.robots,
+            scene=self.scene,
+            dt=self.dt,
+            precision=self.precision,
+            integrator=self.integrator,
+            device=self.device,
+            start_time=first * self.dt,
+            end_time=self.time,
+            steps=self._step - first,
+            status=status,
+            status_time=np.where(status == 0, np.nan, stopped_at * self.dt),
+            center_of_mass=buffers["seen_centers"][centers].astype(np.float64),
+            times=np.array(frame_steps, np.float64) * self.dt,
+            recorded=tuple(recorded.tolist()),
+            energy=_energy(tapes, len(self.robots)),
+            spring_evaluations=int((slots.springs * (until - first)).sum()),
+            wall_time=wall_time,
+            _slots=slots,
+            _positions=buffers["seen_positions"].copy(),
+            _velocities=buffers["seen_velocities"].copy(),
+            _frames={i: f for tape in tapes for i, f in tape.frames_by_robot().items()},
+        )
+
+
+def _energy(tapes: Sequence[Tape], robots: int) -> Energy | None:
+    """Energies of all robots, collected from the slices."""
+    if not tapes[0].energy:
+        return None
+    table = np.zeros((4, robots, len(tapes[0].frame_steps)))
+    for tape in tapes:
+        table[:, tape.members] = tape.energies.transpose(2, 1, 0)
+    return Energy(*table)
+
+
+def _check_robots(robots: Robot | Sequence[Robot]) -> Sequence[Robot]:
+    if isinstance(robots, Robot):
+        return (robots,)
+    if not isinstance(robots, Sequence):
+        raise TypeError(f"robots: got {type(robots).__name__}, expected Robots")
+    if len(robots) == 0:
+        raise ValueError("robots: got none, expected at least one Robot")
+    if isinstance(robots, Variants):
+        return robots
+    for index, robot in enumerate(robots):
+        if not isinstance(robot, Robot):
+            raise TypeError(f"robots[{index}]: got {type(robot).__name__}, expected a Robot")
+    return tuple(robots)
+
+
+def _check_type(name: str, value: object, kind: type):
+    if not isinstance(value, kind):
+        raise TypeError(f"{name}: got {type(value).__name__}, expected a {kind.__name__}")
+    return value
+
+
+def _check_count(name: str, value: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise ValueError(f"{name}: got {value!r}, expected an integer of 1 or more")
+
+
+def _usable_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

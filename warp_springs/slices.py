@@ -1,0 +1,195 @@
+"""Slices of a batch: what one thread steps at a time, and what it records on the way."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+
+import numpy as np
+import warp as wp
+
+from warp_springs.batch import Batch, Group, Slots
+from warp_springs.kernels.lanes import BUNDLE, kernels
+from warp_springs.packing import aligned
+
+__all__ = ["Slice", "Tape", "cut", "run_all"]
+
+#: Slices a thread, so that a thread that is done early takes over work of another.
+SLICES_PER_THREAD = 4
+#: Spring evaluations of one launch: about a fifth of a second, so that Ctrl-C is answered.
+LAUNCH_WORK = 1e8
+#: Values between the scratch blocks of two slices: threads then never share a cache line.
+SCRATCH_GAP = 256
+
+
+def cut(batch: Batch, buffers: Mapping[str, np.ndarray], threads: int) -> list[Slice]:
+    """Cut the groups of a batch into slices of about equal work."""
+    springs, masses = (batch.bundles[:, BUNDLE.index(name)] for name in ("springs", "masses"))
+    work = springs + 2 * masses
+    pieces = SLICES_PER_THREAD * threads if threads > 1 else 1
+    target = work.sum() / pieces
+    slices = []
+    for group in batch.groups:
+        here = np.s_[group.first : group.first + group.count]
+        total = np.cumsum(work[here])
+        inner = np.searchsorted(total, np.arange(target, total[-1], target)) + 1
+        edges = np.unique([0, *inner[inner < group.count], group.count]) + group.first
+        for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            load = int(work[first:last].sum()) * group.features.width
+            slices.append(Slice(group, first, last, load, int(masses[first:last].max()), buffers))
+    return slices
+
+
+class Slice:
+    """Bundles ``first`` to ``last - 1`` of one group, with scratch memory of their own.
+
+    Launches are recorded when the slice is made, on one thread, which also loads the modules
+    (loading is not safe on several); threads only launch them.
+    """
+
+    def __init__(
+        self,
+        group: Group,
+        first: int,
+        last: int,
+        work: int,
+        largest: int,
+        buffers: Mapping[str, np.ndarray],
+    ) -> None:
+        self.first, self.last, self.work = first, last, work
+        self.buffers = buffers
+        advance, observe = kernels(group.features)
+        real = np.dtype(group.features.precision)
+        scratch = np.zeros(3 * largest * group.features.width + SCRATCH_GAP, real)
+        self._arrays = {name: _on_device(values) for name, values in buffers.items()}
+        self._arrays["forces"] = _on_device(aligned([scratch], real))
+        self._everything = _on_device(np.arange(first, last, dtype=np.int32))
+        self._advance = self._record(advance, last - first, first_bundle=first)
+        self._observe = self._record(observe, last - first, which=self._everything)
+
+    def _record(self, kernel: wp.Kernel, dim: int, **own) -> wp.Launch:
+        names = [argument.label for argument in kernel.adj.args]
+        values = [own.get(name, self._arrays.get(name, 0)) for name in names]
+        return wp.launch(kernel, dim, inputs=values, device="cpu", record_cmd=True)
+
+    def advance(self, first_step: int, last_step: int) -> None:
+        """Step all bundles from ``first_step`` to ``last_step``."""
+        self._advance.set_param_by_name("first_step", first_step)
+        self._advance.set_param_by_name("last_step", last_step)
+        self._advance.launch()
+
+    def observe(self, step: int, energy: bool, which: wp.array | None = None) -> None:
+        """Write what is seen of some bundles (default all) at ``step``; changes no state."""
+        which = self._everything if which is None else which
+        if len(which):
+            self._observe.set_dim(len(which))
+            self._observe.set_param_by_name("which", which)
+            self._observe.set_param_by_name("step", step)
+            self._observe.set_param_by_name("energy_wanted", energy)
+            self._observe.launch()
+
+
+@dataclass
+class Tape:
+    """What one slice records in one run, and how far it has come.
+
+    Attributes:
+        members: Robots of the slice, shape (n,).
+        recorded: Those whose frames are kept.
+        frames: Their positions [m], flat, shape (F, 3 * sum of M).
+        energies: Energies [J] of the members, shape (F, n, 4), if they are asked for.
+        done: Steps done so far.
+    """
+
+    slice: Slice
+    slots: Slots
+    recorded: np.ndarray
+    frame_steps: Sequence[int]
+    energy: bool
+    done: int = 0
+    members: np.ndarray = field(init=False)
+    frames: np.ndarray = field(init=False)
+    energies: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        def inside(robots: np.ndarray) -> np.ndarray:
+            bundle = self.slots.bundle[robots]
+            return robots[(bundle >= self.slice.first) & (bundle < self.slice.last)]
+
+        count = len(self.frame_steps)
+        self.members = inside(np.arange(len(self.slots.bundle)))
+        self.recorded = inside(self.recorded)
+        self._state = self.slots.state_indices(self.recorded)
+        self.frames = np.empty((count, len(self._state)))
+        self._lanes = self.slots.lane_indices(self.members, 4)
+        self.energies = np.empty((count if self.energy else 0, len(self.members), 4))
+        bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
+        self._which = None if self.energy else _on_device(bundles)
+
+    def run(self, first: int, last: int, stop: threading.Event) -> None:
+        """Step the slice from ``first`` to ``last``, with the frames between."""
+        at = first
+        for index, step in enumerate(self.frame_steps):
+            at = self._advance(first, at, step, stop)
+            self.slice.observe(step, self.energy, self._which)
+            self._take(index)
+        at = self._advance(first, at, last, stop)
+        if not stop.is_set():
+            self.slice.observe(last, False)
+
+    def _advance(self, first: int, at: int, target: int, stop: threading.Event) -> int:
+        steps = max(1, int(LAUNCH_WORK / max(self.slice.work, 1)))
+        while at < target and not stop.is_set():
+            until = min(at + steps, target)
+            self.slice.advance(at, until)
+            at = until
+            self.done = at - first
+        return at
+
+    def _take(self, index: int) -> None:
+        buffers = self.slice.buffers
+        if len(self._state):
+            self.frames[index] = buffers["seen_positions"][self._state]
+        if self.energy:
+            self.energies[index] = buffers["seen_energies"][self._lanes]
+
+    def frames_by_robot(self) -> dict[int, np.ndarray]:
+        """Frames (F, M, 3) of each recorded robot."""
+        sizes = 3 * self.slots.masses[self.recorded]
+        parts = np.split(self.frames, np.cumsum(sizes)[:-1], axis=1) if len(sizes) else []
+        shape = (len(self.frame_steps), -1, 3)
+        return {
+            int(robot): np.ascontiguousarray(part).reshape(shape)
+            for robot, part in zip(self.recorded, parts, strict=True)
+        }
+
+
+def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress=None) -> None:
+    """Run all tapes on a pool of threads; the largest first, so that little is left at the end.
+
+    ``progress`` is called with the fraction done. On an exception, Ctrl-C included, the threads
+    stop after their present launch.
+    """
+    stop = threading.Event()
+    tapes = sorted(tapes, key=lambda tape: -tape.slice.work)
+    total = (last - first) * sum(tape.slice.work for tape in tapes)
+    with ThreadPoolExecutor(min(threads, len(tapes))) as pool:
+        pending = {pool.submit(tape.run, first, last, stop) for tape in tapes}
+        try:
+            while pending:
+                done, pending = wait(pending, timeout=0.1)
+                for future in done:
+                    future.result()
+                if progress is not None and total:
+                    progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
+        except BaseException:
+            stop.set()
+            raise
+
+
+def _on_device(values: np.ndarray) -> wp.array:
+    """The array itself, as the kernels see it: nothing is copied."""
+    dtype = wp.dtype_from_numpy(values.dtype)
+    return wp.array(values, dtype=dtype, device="cpu", copy=False)

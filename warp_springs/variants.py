@@ -1,0 +1,107 @@
+"""Variants: many robots of one body, held as stacked arrays instead of as many objects."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warp_springs.robot import FIELDS, Robot, checked, freeze
+
+STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule != "index")
+"""The fields in which variants of one body may differ: all but its springs and faces."""
+
+
+class Variants(Sequence[Robot]):
+    """N robots that share one body and differ in the fields given; made by `Robot.variants`.
+
+    A sequence of robots: ``variants[i]`` is built when asked for, a slice is again `Variants`,
+    and no array is copied on the way. Immutable, like the robots.
+
+    Args:
+        body: The robot that gives every field which is not stacked. Rest lengths too: stacked
+            positions do not change them.
+        stacked: Field name -> array with one row a robot on axis 0 and then the shape of the
+            field: (N, M) masses, (N, M, 3) positions or velocities, (N, S) stiffness,
+            rest_length, amplitude or phase, (N,) omega. At least one.
+
+    Raises:
+        TypeError: A field cannot be stacked.
+        ValueError: An array is malformed (the rules of `Robot`), the arrays are of different
+            numbers of robots, or none is given.
+    """
+
+    __slots__ = ("_body", "_count", "_stacked")
+
+    def __init__(self, body: Robot, stacked: Mapping[str, ArrayLike]) -> None:
+        if not stacked:
+            raise ValueError(f"variants need at least one stacked field of {', '.join(STACKABLE)}")
+        arrays: dict[str, NDArray[np.float64]] = {}
+        count = None
+        for name, value in stacked.items():
+            if name not in STACKABLE:
+                raise TypeError(f"variants cannot stack {name!r}, only {', '.join(STACKABLE)}")
+            shape = (count, *np.shape(getattr(body, name)))
+            arrays[name] = checked(name, value, shape, spread=False)
+            count = len(arrays[name])
+        self._keep(body, arrays, count or 0)
+
+    def _keep(self, body: Robot, arrays: dict[str, NDArray[np.float64]], count: int) -> None:
+        for name, value in zip(self.__slots__, (body, count, arrays), strict=True):
+            object.__setattr__(self, name, value)
+
+    @property
+    def body(self) -> Robot:
+        """The robot that gives every field which is not stacked."""
+        return self._body
+
+    @property
+    def stacked(self) -> Mapping[str, NDArray[np.float64]]:
+        """The stacked fields: name -> read-only array (N, ...)."""
+        return MappingProxyType(self._stacked)
+
+    def array(self, name: str) -> NDArray[Any]:
+        """A field of all robots, shape (N, ...), read-only.
+
+        The stacked array, or a view of the body's own that repeats it without copying.
+
+        Raises:
+            ValueError: A robot has no such field.
+        """
+        if name in self._stacked:
+            return self._stacked[name]
+        if name not in FIELDS:
+            raise ValueError(f"a robot has no field {name!r}; it has {', '.join(FIELDS)}")
+        value = getattr(self._body, name)
+        return np.broadcast_to(value, (self._count, *np.shape(value)))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Robot: ...
+    @overload
+    def __getitem__(self, index: slice) -> Variants: ...
+    def __getitem__(self, index: int | slice) -> Robot | Variants:
+        if isinstance(index, slice):
+            part = object.__new__(Variants)
+            arrays = {name: freeze(array[index]) for name, array in self._stacked.items()}
+            part._keep(self._body, arrays, len(range(*index.indices(self._count))))
+            return part
+        i = operator.index(index)
+        if not -self._count <= i < self._count:
+            raise IndexError(f"robot {i} asked for, there are {self._count} variants")
+        return self._body.replace(**{name: array[i] for name, array in self._stacked.items()})
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError("Variants are immutable: make new ones with body.variants(...)")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Variants, (self._body, self._stacked)
+
+    def __repr__(self) -> str:
+        return f"Variants({self._count} of {self._body!r} in {', '.join(self._stacked)})"

@@ -1,0 +1,1 @@
+"""Views of a result: pictures by an own rasteriser, and the appearance that all views share."""
