@@ -17,6 +17,7 @@ from warp_springs.robot import Robot
 from warp_springs.scene import Ground, Scene, damping_rate
 from warp_springs.simulation import Simulation
 from warp_springs.stability import Limits, Status
+from warp_springs.startup import quiet
 from warp_springs.variants import Variants
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "damping_rate",
     "export_usd",
     "plots",
+    "quiet",
     "render",
     "shapes",
 ]

@@ -390,6 +390,7 @@ def _settled(given: Mapping[str, Any], to_check: Any) -> dict[str, Any]:
             raise ValueError("positions: shape (0, 3) given, at least one mass expected")
     if "springs" in to_check:
         done["springs"] = checked("springs", given["springs"], (None, 2))
+        _check_indices("springs", done["springs"], len(done["positions"]))
     counts = {"mass": len(done["positions"]), "spring": len(done["springs"]), "face": None}
     for name, field in FIELDS.items():
         if name in done:
@@ -405,9 +406,8 @@ def _settled(given: Mapping[str, Any], to_check: Any) -> dict[str, Any]:
             done[name] = _filled((counts[field.per] or 0, *field.row), 0, field.dtype)
         else:
             done[name] = checked(name, value, (counts[field.per], *field.row))
-    for name in ("springs", "faces"):
-        if name in to_check:
-            _check_indices(name, done[name], counts["mass"])
+    if "faces" in to_check:
+        _check_indices("faces", done["faces"], counts["mass"])
     return done
 
 

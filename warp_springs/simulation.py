@@ -75,7 +75,7 @@ class Simulation:
             _check_count("threads", threads)
         self.dt, self.device = float(dt), str(device)
         self.precision, self.integrator = precision, integrator
-        self.threads = threads or _usable_cores()
+        self.threads = threads or usable_cores()
         self._step = 0
         self._interrupted = False
         self._batch = Batch(
@@ -250,7 +250,7 @@ def _check_count(name: str, value: int) -> None:
         raise ValueError(f"{name}: got {value!r}, expected an integer of 1 or more")
 
 
-def _usable_cores() -> int:
+def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -113,8 +113,8 @@ def _write(
     looks = usd_stage.add_looks(stage)
     boxes = np.stack([item.box for item in tracks]) + offsets[:, None]
     if result.scene.ground is not None:
-        diameter = float(np.median(boxes[:, 1] - boxes[:, 0]))
-        usd_stage.add_ground(stage, looks, boxes, diameter)
+        sizes = [np.linalg.norm(item.high[0] - item.low[0]) for item in tracks]
+        usd_stage.add_ground(stage, looks, boxes, float(np.median(sizes)))
     usd_stage.add_lights(stage)
     usd_stage.add_camera(stage, boxes)
     prims = unique_names([item.index for item in tracks], names, usd_stage.SCENERY)

@@ -20,7 +20,7 @@ class Part(NamedTuple):
 
     Attributes:
         points: Vertices [m], shape (V, 3).
-        normals: Outward unit normals for smooth shading, shape (V, 3), or ``None`` for flat.
+        normals: Outward unit normals for smooth shading, shape (V, 3), or ``None`` for flat faces.
         faces: Corners, counter-clockwise seen from outside, shape (faces, corners).
         masses: The mass that each vertex follows, shape (V,).
     """
@@ -71,9 +71,10 @@ def balls(positions: FloatArray, radius: float) -> Part:
 
 
 def skin(positions: FloatArray, faces: IntArray) -> Part:
-    """The exterior triangles over just the masses they touch."""
-    masses, corners = np.unique(faces, return_inverse=True)
-    return Part(positions[masses], None, corners.reshape(faces.shape).astype(np.int32), masses)
+    """The exterior triangles, no vertex shared, so that every viewer shades them flat."""
+    corners = faces.ravel()
+    triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    return Part(positions[corners], None, triangles, corners)
 
 
 def checker(half_tiles: int, tile: float) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:

@@ -22,6 +22,8 @@ SCENERY = ("World", "Robots", "Looks", "Ground", "Lights", "Key", "Sky", "Camera
 
 _LOOKS = WORLD.AppendChild("Looks")
 _STRESS_PRIMVAR = "displayColor"
+_MARGIN = 1.1
+"""Width of the picture over the width of what it has to show."""
 _MOST_TILES = 80
 """Between the middle of the floor and its edge."""
 
@@ -97,15 +99,15 @@ def constant_color(mesh: UsdGeom.Mesh, color: ArrayLike) -> None:
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(vec3f([color]))
 
 
-def add_ground(stage: Usd.Stage, looks: Looks, boxes: FloatArray, diameter: float) -> None:
+def add_ground(stage: Usd.Stage, looks: Looks, boxes: FloatArray, size: float) -> None:
     """The plane z = 0 as a checker of two materials, far around the boxes, (R, 2, 3) [m].
 
-    The tiles are a round length that suits bodies of a diameter [m].
+    The tiles are a round length somewhat below the size of a body [m].
     """
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     middle = 0.5 * (low + high)[:2]
     half = 2.5 * float(np.linalg.norm(high - low))
-    tile = _round_length(max(0.6 * diameter, half / _MOST_TILES))
+    tile = _round_length(max(0.7 * size, half / _MOST_TILES))
     points, quads, dark = checker(int(np.ceil(half / tile)), tile)
     points[:, :2] += tile * np.rint(middle / tile)
     ground = define_mesh(stage, WORLD.AppendChild("Ground"), points, quads)
@@ -139,17 +141,21 @@ def add_camera(stage: Usd.Stage, boxes: FloatArray) -> None:
     """A camera that sees every box, (R, 2, 3) [m], entirely, from the front and above."""
     corners = np.concatenate([boxes[:, pick, range(3)] for pick in np.ndindex(2, 2, 2)])
     camera = UsdGeom.Camera.Define(stage, WORLD.AppendChild("Camera"))
-    camera.CreateFocalLengthAttr(40.0)
-    camera.CreateHorizontalApertureAttr(36.0)
-    camera.CreateVerticalApertureAttr(20.25)
-    half_angle = np.array([18.0, 10.125]) / 40.0
+    aperture, focal_length = np.array([36.0, 20.25]), 40.0
+    camera.CreateHorizontalApertureAttr(float(aperture[0]))
+    camera.CreateVerticalApertureAttr(float(aperture[1]))
+    camera.CreateFocalLengthAttr(focal_length)
+
     ahead = _unit(np.array([-0.45, 0.85, -0.5]))
     right = _unit(np.cross(ahead, (0.0, 0.0, 1.0)))
-    up = np.cross(right, ahead)
+    across = np.stack([right, np.cross(right, ahead)])
+    # A corner at depth z along the view and x aside is seen where |x - aim| <= slope (distance + z)
+    slope = 0.5 * aperture / focal_length / _MARGIN
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    offset = corners - middle
-    aside = np.abs(offset @ np.stack([right, up], axis=1)) / half_angle
-    distance = 1.08 * float((aside - (offset @ ahead)[:, None]).max())
+    aside, depth = (corners - middle) @ across.T, slope * ((corners - middle) @ ahead)[:, None]
+    highest, lowest = (aside - depth).max(axis=0), (aside + depth).min(axis=0)
+    distance = float(((highest - lowest) / (2.0 * slope)).max())
+    middle = middle + 0.5 * (highest + lowest) @ across
     eye = Gf.Vec3d(*(middle - distance * ahead))
     look = Gf.Matrix4d().SetLookAt(eye, Gf.Vec3d(*middle), Gf.Vec3d(0, 0, 1))
     camera.AddTransformOp().Set(look.GetInverse())

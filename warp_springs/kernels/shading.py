@@ -1,7 +1,9 @@
 """What colour does each pixel have: sun, sky, soft shadow, a checker floor that fades away.
 
-Coordinates are those of `raster`; colours are linear RGB. The shadow is a percentage-closer soft
-shadow: the mean distance of what hides the sun near a point sets how wide the edge is blurred.
+Coordinates are those of `raster`; colours are linear RGB. Shadows come from a map of the depths
+that the sun sees. On the floor they are soft: whatever is in the map hides the floor, so a table
+of sums over the map (Crow 1984) gives the hidden share of a square of any size at once, and the
+mean way from what hides it to the floor sets that size (after Fernando 2005).
 """
 
 import warp as wp
@@ -10,11 +12,15 @@ from warp_springs.kernels.raster import EMPTY, Lens
 
 wp.set_module_options({"enable_backward": False})
 
-BLOCK = wp.constant(16)
-"""Texels along the edge of a block of the shadow map; no blur may reach farther than this."""
+REACH = wp.constant(14)
+"""Half the edge of the largest square over which a shadow's edge is blurred [texels]."""
+COLUMNS_A_THREAD = wp.constant(16)
+"""Columns of the table of sums that one thread adds up: two lines of the cache."""
 
-_NO_SURFACE = wp.constant(wp.uint32(0xFFFFFFFF))
+_LONGEST_WAY = wp.constant(2000.0)  # in texels: the sum over 1024 x 1024 stays below 2^31
+_SURFACE_BITS = wp.constant(wp.uint64(0xFFFFFFFF))
 _FAR = wp.constant(1.0e30)
+_FADED = wp.constant(15.0)  # there, less than half a grey level of the floor is left
 
 
 @wp.struct
@@ -28,8 +34,8 @@ class Sun:
     scale: float  # texels per m
     center: float  # texel at the sun's X = Y = 0
     size: int  # texels along the edge of the map
-    spread: float  # blur [m] per m between the hiding and the hidden surface
-    reach: float  # widest blur [texels]
+    spread: float  # half the blur's width per length from the hiding to the hidden point
+    floor: wp.vec3  # depth of the floor [m]: [0] + [1] column + [2] row
 
 
 @wp.struct
@@ -68,41 +74,85 @@ def depth_of(key: wp.uint64):
 
 
 @wp.kernel
-def nearest_of_blocks(
+def sum_rows(
+    sun: Sun,
     depths: wp.array(dtype=wp.uint64),
-    size: int,
     # outputs
-    nearest: wp.array2d(dtype=float),
+    sums: wp.array2d(dtype=wp.vec2i),  # (size + 1, size + 1), its first row and column zero
 ):
-    """Smallest depth in each block of the shadow map."""
-    by, bx = wp.tid()
-    key = EMPTY
-    for y in range(by * BLOCK, (by + 1) * BLOCK):
-        for x in range(bx * BLOCK, (bx + 1) * BLOCK):
-            key = wp.min(key, depths[y * size + x])
-    nearest[by, bx] = _FAR
-    if key != EMPTY:
-        nearest[by, bx] = depth_of(key)
+    """Sum along each row of the map: covered texels, and how far the sun's rays go on from there.
+
+    The ways from what covers a texel to the floor are whole texels: integers add up exactly.
+    """
+    y = wp.tid()
+    covered = wp.int32(0)
+    way = wp.int32(0)
+    for x in range(sun.size):
+        key = depths[y * sun.size + x]
+        if key != EMPTY:
+            floor = sun.floor[0] + sun.floor[1] * (float(x) + 0.5) + sun.floor[2] * (float(y) + 0.5)
+            gap = (floor - depth_of(key)) * sun.scale
+            if gap > 0.0:
+                covered += 1
+                way += int(wp.min(gap, _LONGEST_WAY))
+        sums[y + 1, x + 1] = wp.vec2i(covered, way)
 
 
 @wp.kernel
-def nearest_of_neighbours(
-    nearest: wp.array2d(dtype=float),
+def sum_columns(
     # outputs
-    around: wp.array2d(dtype=float),
+    sums: wp.array2d(dtype=wp.vec2i),
 ):
-    """Smallest depth in each block and the eight around it."""
-    by, bx = wp.tid()
-    z = float(_FAR)
-    for y in range(wp.max(by - 1, 0), wp.min(by + 2, nearest.shape[0])):
-        for x in range(wp.max(bx - 1, 0), wp.min(bx + 2, nearest.shape[1])):
-            z = wp.min(z, nearest[y, x])
-    around[by, bx] = z
+    """Make the sums along rows sums over all that lies above and to the left."""
+    first = 1 + wp.tid() * COLUMNS_A_THREAD
+    last = wp.min(first + COLUMNS_A_THREAD, sums.shape[1])
+    for y in range(2, sums.shape[0]):
+        for x in range(first, last):
+            sums[y, x] = sums[y, x] + sums[y - 1, x]
+
+
+@wp.func
+def covered_before(sums: wp.array2d(dtype=wp.vec2i), base: int, x: float, y: float):
+    """Covered area above and to the left of a place of the map, less `base` [texels]."""
+    x0 = int(x)
+    y0 = int(y)
+    fx = x - float(x0)
+    upper = wp.lerp(float(sums[y0, x0][0] - base), float(sums[y0, x0 + 1][0] - base), fx)
+    lower = wp.lerp(float(sums[y0 + 1, x0][0] - base), float(sums[y0 + 1, x0 + 1][0] - base), fx)
+    return wp.lerp(upper, lower, y - float(y0))
+
+
+@wp.func
+def shadow_on_floor(sun: Sun, sums: wp.array2d(dtype=wp.vec2i), p: wp.vec3):
+    """Share of the sun that is hidden from a point of the floor, 0 ... 1."""
+    q = sun.turn * p + sun.shift
+    x = sun.center + q[0] * sun.scale
+    y = sun.center + q[1] * sun.scale
+    first = float(REACH + 1)
+    last = float(sun.size) - first
+    if x < first or y < first or x >= last or y >= last:
+        return 0.0
+    x0 = int(x) - REACH
+    y0 = int(y) - REACH
+    x1 = int(x) + REACH + 1
+    y1 = int(y) + REACH + 1
+    near = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+    if near[0] == 0:
+        return 0.0
+    if near[0] == (2 * REACH + 1) * (2 * REACH + 1):
+        return 1.0
+    blur = wp.clamp(float(near[1]) / float(near[0]) * sun.spread, 0.75, float(REACH))
+    base = sums[int(y), int(x)][0]
+    hidden = covered_before(sums, base, x + blur, y + blur)
+    hidden -= covered_before(sums, base, x - blur, y + blur)
+    hidden -= covered_before(sums, base, x + blur, y - blur)
+    hidden += covered_before(sums, base, x - blur, y - blur)
+    return hidden / (4.0 * blur * blur)
 
 
 @wp.func
 def hidden_at(sun: Sun, depths: wp.array(dtype=wp.uint64), x: float, y: float, z: float):
-    """Share of the four texels around a place of the map that hide depth z, bilinear."""
+    """Share of the four texels nearest to a place of the map that hide depth z, bilinear."""
     x0 = int(wp.floor(x - 0.5))
     y0 = int(wp.floor(y - 0.5))
     if x0 < 0 or y0 < 0 or x0 >= sun.size - 1 or y0 >= sun.size - 1:
@@ -118,57 +168,21 @@ def hidden_at(sun: Sun, depths: wp.array(dtype=wp.uint64), x: float, y: float, z
 
 
 @wp.func
-def blur_of_shadow(
+def shadow_on_surface(
     sun: Sun,
     depths: wp.array(dtype=wp.uint64),
-    disc: wp.array(dtype=wp.vec2),
-    x: float,
-    y: float,
-    z: float,
-):
-    """Radius in texels by which the shadow at a place is blurred; negative where none is near."""
-    total = float(0.0)
-    count = float(0.0)
-    for i in range(0, disc.shape[0], 2):
-        tx = int(x + sun.reach * disc[i][0])
-        ty = int(y + sun.reach * disc[i][1])
-        if tx >= 0 and ty >= 0 and tx < sun.size and ty < sun.size:
-            depth = depth_of(depths[ty * sun.size + tx])
-            if depth < z:
-                total += depth
-                count += 1.0
-    if count == 0.0:
-        return -1.0
-    return wp.clamp((z - total / count) * sun.spread * sun.scale, 0.75, sun.reach)
-
-
-@wp.func
-def shadow(
-    sun: Sun,
-    depths: wp.array(dtype=wp.uint64),
-    around: wp.array2d(dtype=float),
-    disc: wp.array(dtype=wp.vec2),
+    disc: wp.array(dtype=wp.vec2),  # where to look, in texels
     p: wp.vec3,
     normal: wp.vec3,
 ):
-    """Share of the sun that is hidden from a point, 0 ... 1."""
+    """Share of the sun that is hidden from a point of a drawn surface, 0 ... 1."""
     texel = 1.0 / sun.scale
-    q = sun.turn * (p + normal * (1.5 * texel)) + sun.shift
+    q = sun.turn * (p + normal * (2.0 * texel)) + sun.shift
     x = sun.center + q[0] * sun.scale
     y = sun.center + q[1] * sun.scale
-    z = q[2] - texel
-    bx = int(wp.floor(x)) / BLOCK
-    by = int(wp.floor(y)) / BLOCK
-    if x < 0.0 or y < 0.0 or bx >= around.shape[1] or by >= around.shape[0]:
-        return 0.0
-    if around[by, bx] >= z:
-        return 0.0
-    blur = blur_of_shadow(sun, depths, disc, x, y, z)
-    if blur < 0.0:
-        return 0.0
-    hidden = float(0.0)
+    hidden = wp.float32(0.0)
     for i in range(disc.shape[0]):
-        hidden += hidden_at(sun, depths, x + blur * disc[i][0], y + blur * disc[i][1], z)
+        hidden += hidden_at(sun, depths, x + disc[i][0], y + disc[i][1], q[2] - texel)
     return hidden / float(disc.shape[0])
 
 
@@ -183,12 +197,6 @@ def square_wave(u: float, width: float):
 
 
 @wp.func
-def sky_color(floor: Floor, rise: float):
-    """Colour of the sky where a ray climbs by `rise` per unit of length."""
-    return wp.lerp(floor.sky, floor.zenith, wp.clamp(rise * 1.6, 0.0, 1.0))
-
-
-@wp.func
 def floor_depth(floor: Floor, sun: Sun, d: wp.vec3):
     """Depth at which the ray t d meets the floor; far away where it does not."""
     fall = -wp.dot(sun.up, d)
@@ -199,35 +207,26 @@ def floor_depth(floor: Floor, sun: Sun, d: wp.vec3):
 
 @wp.func
 def background(
-    lens: Lens,
-    sun: Sun,
-    floor: Floor,
-    depths: wp.array(dtype=wp.uint64),
-    around: wp.array2d(dtype=float),
-    disc: wp.array(dtype=wp.vec2),
-    d: wp.vec3,
+    lens: Lens, sun: Sun, floor: Floor, sums: wp.array2d(dtype=wp.vec2i), d: wp.vec3, t: float
 ):
-    """Colour of the floor or the sky along the ray t d; the checker is averaged over a pixel."""
+    """Colour of floor or sky along the ray t d; the checker is averaged over a pixel."""
     length = wp.length(d)
-    t = floor_depth(floor, sun, d)
-    sky = sky_color(floor, wp.dot(sun.up, d) / length)
+    rise = wp.dot(sun.up, d)
+    sky = wp.lerp(floor.sky, floor.zenith, wp.clamp(1.6 * rise / length, 0.0, 1.0))
     away = wp.max(t * length - floor.fade_from, 0.0) / floor.fade_over
-    if away > 15.0:
+    if away > _FADED:
         return sky
     p = d * t
     # how the place on the floor moves from pixel to pixel: d(t d)/dX = t (e - d (up.e) / (up.d))
     step = t / lens.focal
-    fall = wp.dot(sun.up, d)
-    to_right = (wp.vec3(1.0, 0.0, 0.0) - d * (sun.up[0] / fall)) * step
-    to_below = (wp.vec3(0.0, 1.0, 0.0) - d * (sun.up[1] / fall)) * step
+    to_right = (wp.vec3(1.0, 0.0, 0.0) - d * (sun.up[0] / rise)) * step
+    to_below = (wp.vec3(0.0, 1.0, 0.0) - d * (sun.up[1] / rise)) * step
     wide_x = wp.abs(wp.dot(floor.axis_x, to_right)) + wp.abs(wp.dot(floor.axis_x, to_below))
     wide_y = wp.abs(wp.dot(floor.axis_y, to_right)) + wp.abs(wp.dot(floor.axis_y, to_below))
-    checker = square_wave(
-        floor.eye_x + wp.dot(floor.axis_x, p), wp.max(wide_x, 1.0e-3)
-    ) * square_wave(floor.eye_y + wp.dot(floor.axis_y, p), wp.max(wide_y, 1.0e-3))
-    color = wp.lerp(floor.dark, floor.light, 0.5 + 0.5 * checker)
-    hidden = shadow(sun, depths, around, disc, p, sun.up)
-    color *= 1.0 - 0.62 * hidden
+    wave_x = square_wave(floor.eye_x + wp.dot(floor.axis_x, p), wp.max(wide_x, 1.0e-3))
+    wave_y = square_wave(floor.eye_y + wp.dot(floor.axis_y, p), wp.max(wide_y, 1.0e-3))
+    color = wp.lerp(floor.dark, floor.light, 0.5 + 0.5 * wave_x * wave_y)
+    color *= 1.0 - 0.62 * shadow_on_floor(sun, sums, p)
     return wp.lerp(color, sky, away * away / (1.0 + away * away))
 
 
@@ -236,7 +235,6 @@ def surface_color(
     sun: Sun,
     surfaces: Surfaces,
     depths: wp.array(dtype=wp.uint64),
-    around: wp.array2d(dtype=float),
     disc: wp.array(dtype=wp.vec2),
     d: wp.vec3,
     depth: float,
@@ -244,36 +242,36 @@ def surface_color(
 ):
     """Colour of a drawn surface where the ray t d meets it."""
     p = d * depth
-    n_triangles = surfaces.corners.shape[0]
-    n_cylinders = surfaces.ends.shape[0]
-    gloss = float(0.04)
+    cylinder = surface - surfaces.corners.shape[0]
+    sphere = cylinder - surfaces.ends.shape[0]
+    gloss = wp.float32(0.04)
     normal = wp.vec3(0.0, 0.0, -1.0)
-    if surface < n_triangles:
+    if cylinder < 0:
         t = surfaces.corners[surface]
         a = surfaces.points[t[0]]
         normal = wp.cross(surfaces.points[t[1]] - a, surfaces.points[t[2]] - a)
-    elif surface < n_triangles + n_cylinders:
-        e = surfaces.ends[surface - n_triangles]
+    elif sphere < 0:
+        e = surfaces.ends[cylinder]
         a = surfaces.points[e[0]]
         axis = wp.normalize(surfaces.points[e[1]] - a)
         normal = p - a - axis * wp.dot(p - a, axis)
         gloss = 0.16
     else:
-        normal = p - surfaces.points[surfaces.centers[surface - n_triangles - n_cylinders]]
+        normal = p - surfaces.points[surfaces.centers[sphere]]
         gloss = 0.35
     normal = wp.normalize(normal)
     if wp.dot(normal, d) > 0.0:
         normal = -normal
 
-    view = wp.normalize(d)
-    facing = wp.dot(normal, sun.direction)
-    sunlight = float(0.0)
+    facing = wp.max(wp.dot(normal, sun.direction), 0.0)
+    sunlight = wp.float32(0.0)
     if facing > 0.0:
-        sunlight = 1.0 - shadow(sun, depths, around, disc, p, normal)
+        sunlight = 1.0 - shadow_on_surface(sun, depths, disc, p, normal)
     from_above = 0.5 + 0.5 * wp.dot(normal, sun.up)
     skylight = wp.lerp(wp.vec3(0.30, 0.29, 0.28), wp.vec3(0.46, 0.50, 0.56), from_above)
-    light = skylight + wp.vec3(0.74, 0.71, 0.66) * (wp.max(facing, 0.0) * sunlight)
-    shine = wp.max(wp.dot(normal, wp.normalize(sun.direction - view)), 0.0)
+    light = skylight + wp.vec3(0.74, 0.71, 0.66) * (facing * sunlight)
+    halfway = wp.normalize(sun.direction - wp.normalize(d))
+    shine = wp.max(wp.dot(normal, halfway), 0.0)
     for _ in range(5):
         shine *= shine
     white = gloss * shine * sunlight
@@ -288,40 +286,39 @@ def shade(
     floor: Floor,
     surfaces: Surfaces,
     depths: wp.array(dtype=wp.uint64),
-    around: wp.array2d(dtype=float),
+    sums: wp.array2d(dtype=wp.vec2i),
     disc: wp.array(dtype=wp.vec2),
     keys: wp.array(dtype=wp.uint64),
     encode: wp.array(dtype=wp.uint8),  # linear 0 ... 1 -> screen value
     # outputs
     picture: wp.array3d(dtype=wp.uint8),
 ):
-    """Colour of a pixel: each surface seen by its samples is shaded once and counts by its share."""
+    """Shade each surface that a pixel's samples see once; it counts by its share of them."""
     y, x = wp.tid()
     n = offsets.shape[0]
+    first = y * n * lens.width + x
     total = wp.vec3(0.0, 0.0, 0.0)
-    done = int(0)
+    done = wp.int32(0)
     for s in range(n):
         if (done >> s) & 1 == 0:
+            key = keys[first + s * lens.width]
+            count = wp.float32(0.0)
+            for other in range(s, n):
+                same = keys[first + other * lens.width] ^ key
+                if same & _SURFACE_BITS == wp.uint64(0):
+                    done = done | (1 << other)
+                    count += 1.0
             left = (float(x) + offsets[s][0] - lens.center_x) / lens.focal
             top = (float(lens.first_row + y) + offsets[s][1] - lens.center_y) / lens.focal
             d = wp.vec3(left, top, 1.0)
-            key = keys[(y * n + s) * lens.width + x]
-            surface = wp.uint32(key & wp.uint64(0xFFFFFFFF))
-            count = float(0.0)
-            for other in range(s, n):
-                key_of_other = keys[(y * n + other) * lens.width + x]
-                if wp.uint32(key_of_other & wp.uint64(0xFFFFFFFF)) == surface:
-                    done = done | (1 << other)
-                    count += 1.0
-            color = wp.vec3(0.0, 0.0, 0.0)
-            if surface == _NO_SURFACE or depth_of(key) > floor_depth(floor, sun, d):
-                color = background(lens, sun, floor, depths, around, disc, d)
+            depth = depth_of(key)
+            ground = floor_depth(floor, sun, d)
+            if depth <= ground:
+                surface = int(key & _SURFACE_BITS)
+                total += surface_color(sun, surfaces, depths, disc, d, depth, surface) * count
             else:
-                color = surface_color(
-                    sun, surfaces, depths, around, disc, d, depth_of(key), int(surface)
-                )
-            total += color * count
-    top_value = float(encode.shape[0] - 1)
+                total += background(lens, sun, floor, sums, d, ground) * count
+    brightest = float(encode.shape[0] - 1)
     for channel in range(3):
-        value = wp.clamp(total[channel] / float(n), 0.0, 1.0) * top_value
+        value = wp.clamp(total[channel] / float(n), 0.0, 1.0) * brightest
         picture[lens.first_row + y, x, channel] = encode[int(value + 0.5)]

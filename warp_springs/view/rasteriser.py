@@ -29,8 +29,8 @@ _BAND_ROWS = 90
 _CUDA_PARTS = 16
 _MAP_SIZE = 1024
 _SUN_SPREAD = 0.07
-_SUN_REACH = 12.0
-_TAPS = 24
+_DISC_RADIUS = 2.0
+_DISC_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -92,15 +92,14 @@ class Rasteriser:
         self._band_rows = min(_BAND_ROWS, height) if on_cpu else height
         self._samples = self._vectors(_SAMPLES)
         self._centre_of_pixel = self._vectors(((0.5, 0.5),))
-        self._disc = self._vectors(_disc(_TAPS))
+        self._disc = self._vectors(_DISC_RADIUS * _disc(_DISC_POINTS))
         self._encode = wp.array(_screen_values(), dtype=wp.uint8, device=self.device)
         self._picture = wp.zeros((height, width, 3), dtype=wp.uint8, device=self.device)
         keys = width * self._band_rows * len(_SAMPLES)
         self._keys = [self._empty_keys(keys) for _ in range(self._threads)]
         self._map = self._empty_keys(_MAP_SIZE * _MAP_SIZE)
-        blocks = _MAP_SIZE // int(shading.BLOCK)
-        self._nearest = wp.zeros((blocks, blocks), dtype=float, device=self.device)
-        self._around = wp.zeros((blocks, blocks), dtype=float, device=self.device)
+        table = (_MAP_SIZE + 1, _MAP_SIZE + 1)
+        self._sums = wp.zeros(table, dtype=wp.vec2i, device=self.device)
 
     def draw(self, drawing: Drawing, camera: Camera) -> NDArray[np.uint8]:
         """Return the picture, (H, W, 3) uint8 sRGB; the same input gives the same bits.
@@ -111,17 +110,10 @@ class Rasteriser:
         shapes = self._shapes(drawing)
         self._map.fill_(raster.EMPTY)
         self._draw_shapes(sun_lens, self._centre_of_pixel, sun_points, shapes, self._map)
-        dim = self._nearest.shape
         launch = functools.partial(wp.launch, device=self.device)
-        launch(
-            shading.nearest_of_blocks,
-            dim,
-            inputs=[self._map, _MAP_SIZE],
-            outputs=[self._nearest],
-        )
-        launch(
-            shading.nearest_of_neighbours, dim, inputs=[self._nearest], outputs=[self._around]
-        )
+        launch(shading.sum_rows, _MAP_SIZE, inputs=[sun, self._map], outputs=[self._sums])
+        groups = -(-_MAP_SIZE // int(shading.COLUMNS_A_THREAD))
+        launch(shading.sum_columns, groups, inputs=[], outputs=[self._sums])
         points = self._vectors(camera.view(drawing.points))
         surfaces = _surfaces(points, shapes)
         floor = _floor(drawing, camera)
@@ -156,8 +148,18 @@ class Rasteriser:
         wp.launch(
             shading.shade,
             dim=(lens.rows, width),
-            inputs=[lens, self._samples, sun, floor, surfaces, self._map, self._around]
-            + [self._disc, keys, self._encode],
+            inputs=[
+                lens,
+                self._samples,
+                sun,
+                floor,
+                surfaces,
+                self._map,
+                self._sums,
+                self._disc,
+                keys,
+                self._encode,
+            ],
             outputs=[self._picture],
             device=self.device,
         )
@@ -174,8 +176,14 @@ class Rasteriser:
         launch(
             raster.draw_spheres,
             (len(shapes["balls"]), lens.parts),
-            inputs=[lens, samples, points, shapes["balls"], shapes["ball_radius"]]
-            + [n_triangles + n_bars],
+            inputs=[
+                lens,
+                samples,
+                points,
+                shapes["balls"],
+                shapes["ball_radius"],
+                n_triangles + n_bars,
+            ],
         )
         launch(
             raster.draw_cylinders,
@@ -225,7 +233,10 @@ class Rasteriser:
         sun.center = _MAP_SIZE / 2
         sun.size = _MAP_SIZE
         sun.spread = _SUN_SPREAD
-        sun.reach = _SUN_REACH
+        # the height of a point X, Y, Z of the sun's view above the floor is rise . (X, Y, Z) + foot
+        rise, foot = axes[:, 2], axes[:, 2] @ origin - (drawing.floor or 0.0)
+        slope = -rise[:2] / rise[2] * texel
+        sun.floor = wp.vec3(-foot / rise[2] - slope.sum() * _MAP_SIZE / 2, *slope)
         return sun, lens, self._vectors(seen - origin)
 
     def _vectors(self, values) -> wp.array:
