@@ -188,8 +188,8 @@ def main() -> None:
         )
     console = Console()
     console.print(
-        f"{args.robots} lattices of {rows[0]['springs_per_robot']} springs on {platform.processor()}"
-        f" {platform.machine()}, {rows[0]['threads']} threads; springs per second"
+        f"{args.robots} lattices of {rows[0]['springs_per_robot']} springs, springs per second; "
+        f"{rows[0]['threads']} threads, {platform.machine()}; {rows[0]['features']}"
     )
     console.print(table)
     if args.json:

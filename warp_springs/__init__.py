@@ -1,10 +1,10 @@
 """Thousands of mass-spring soft robots stepped in parallel with NVIDIA Warp.
 
-    import warp_springs as ws
+import warp_springs as ws
 
-    cube = ws.shapes.cube().moved((0, 0, 0.5)).spinning((3, -2, 4))
-    result = ws.Simulation([cube] * 1000, ws.Scene()).run(duration=2.0, fps=30, record=[0])
-    ws.export_usd(result, "cube.usdc")
+cube = ws.shapes.cube().moved((0, 0, 0.5)).spinning((3, -2, 4))
+result = ws.Simulation([cube] * 1000, ws.Scene()).run(duration=2.0, fps=30, record=[0])
+ws.export_usd(result, "cube.usdc")
 """
 
 from importlib import import_module

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_springs.kernels.lanes import BUNDLE, Features, native_width
+from warp_springs.kernels.buffers import BUNDLE, dtype_of
+from warp_springs.kernels.dialect import native_width
+from warp_springs.kernels.lanes import Features
 from warp_springs.packing import (
     MASS_FIELDS,
     SPRING_FIELDS,
@@ -34,18 +36,18 @@ __all__ = ["Batch", "Group", "Slots"]
 #: Steps of the contact flow within one step: no fewer, no more, if the caller does not choose.
 SUBSTEPS = (8, 64)
 
-#: Buffers that are packed, in the precision of the run unless a type is given.
-BUFFERS: dict[str, type | None] = {
-    "rows": np.int32,
-    "partners": np.int32,
-    "inverse_masses": None,
-    "coefficients": None,
-    "omegas": np.float64,
-    "reaches2": None,
-    "positions": None,
-    "velocities": None,
-    "oscillators": None,
-}
+#: Buffers that are packed; all others are made by the simulation.
+PACKED = (
+    "rows",
+    "partners",
+    "inverse_masses",
+    "coefficients",
+    "omegas",
+    "reaches2",
+    "positions",
+    "velocities",
+    "oscillators",
+)
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Slots:
         return start + component * np.repeat(self.width[robots], counts)
 
     def lane_indices(self, robots: np.ndarray | slice, columns: int) -> np.ndarray:
-        """Where ``columns`` values of some robots are in a buffer with so many a lane, (n, columns)."""
+        """Where values of some robots are, (n, columns), in a buffer with so many a lane."""
         start = columns * self.first_lane[robots] + self.lane[robots]
         return start[:, None] + np.arange(columns) * self.width[robots][:, None]
 
@@ -120,7 +122,7 @@ class Batch:
         slots: Where each robot lives.
         groups: Runs of bundles, one kernel each.
         bundles: The table of bundles, shape (B, len(BUNDLE)), int64.
-        arrays: The flat buffers of ``BUFFERS``, by name, on 64-byte boundaries.
+        arrays: The flat buffers of ``PACKED``, by name, on 64-byte boundaries.
         substeps: Contact sub-steps of each robot, shape (N,).
     """
 
@@ -138,8 +140,8 @@ class Batch:
         self._scene, self._dt, self._stretch = scene, dt, stretch
         self._precision, self._integrator = precision, integrator
         self._fixed_substeps = contact_substeps
-        self._parts: dict[str, list[np.ndarray]] = {name: [] for name in BUFFERS}
-        self._sizes = dict.fromkeys(BUFFERS, 0)
+        self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
+        self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
         self.groups: list[Group] = []
         self.substeps = np.ones(len(robots), np.int64)
@@ -180,7 +182,8 @@ class Batch:
                     members = members[:-1]
                 if len(members):
                     chosen = {name: values[members] for name, values in fields.items()}
-                    strips[width, bool(kind[0])].append(Strip.stacked(ids[members], springs, chosen))
+                    strip = Strip.stacked(ids[members], springs, chosen)
+                    strips[width, bool(kind[0])].append(strip)
         for actuated, ids in alone.items():
             strips[1, actuated].append(Strip.ragged(ids, [robots[i] for i in ids]))
         return strips
@@ -241,7 +244,7 @@ class Batch:
         self._append("partners", partner)
         for name, values in per_robot.items():
             flat = lane_major(values, n, width) if strip.shared else values.ravel()
-            self._append(name, flat.astype(BUFFERS[name] or self._precision, copy=False))
+            self._append(name, flat.astype(dtype_of(name, self._precision), copy=False))
 
     def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
         """The rows of the table of bundles for a strip."""
@@ -270,7 +273,7 @@ class Batch:
         """Join the parts and look up where each robot went."""
         self.bundles = np.concatenate(self._tables)
         self.arrays = {
-            name: aligned(parts, np.dtype(BUFFERS[name] or self._precision))
+            name: aligned(parts, dtype_of(name, self._precision))
             for name, parts in self._parts.items()
         }
         self._parts.clear()

@@ -76,7 +76,7 @@ class InfoCommand:
         from rich.table import Table
 
         import warp_springs as ws
-        from warp_springs.kernels.lanes import native_width
+        from warp_springs.kernels.dialect import native_width
         from warp_springs.simulation import usable_cores
 
         table = Table(show_header=False, box=None)
@@ -109,11 +109,11 @@ def _print_outcome(console: Console, result: Result) -> None:
 
     total = result.energy.total[0]
     change = abs(total - total[0]).max() / abs(total[0])
-    speed = result.spring_evaluations / result.wall_time
+    speed = result.spring_evaluations / result.wall_time / 1e6
     states = ", ".join(sorted({Status(code).name for code in result.status.tolist()}))
     console.print(f"status: {states}")
-    console.print(f"total energy of robot 0 changes by at most {change:.1e} of its initial value")
-    console.print(f"{result.wall_time:.2f} s for {result.end_time:g} s, {speed / 1e6:,.0f} M springs/s")
+    console.print(f"total energy of robot 0: largest change {change:.1e} of its initial value")
+    console.print(f"{result.end_time:g} s in {result.wall_time:.2f} s, {speed:,.0f} M springs/s")
 
 
 def _energy_figure(result: Result, path: Path) -> None:

@@ -40,9 +40,7 @@ class Demo:
     def run(self, progress: Callable[[float], None] | None = None) -> Result:
         """Simulate it, with all frames and energies."""
         simulation = Simulation(self.robots(), self.scene, self.dt)
-        return simulation.run(
-            self.duration, fps=FRAMES_PER_SECOND, energy=True, progress=progress
-        )
+        return simulation.run(self.duration, fps=FRAMES_PER_SECOND, energy=True, progress=progress)
 
     def parameters(self) -> dict[str, object]:
         """Every parameter of the simulation and of its first robot."""

@@ -57,11 +57,6 @@ class Strip:
         return cls(np.asarray(ids), masses, counts, springs, False, fields)
 
     @property
-    def owner(self) -> np.ndarray:
-        """The robot (0 to n - 1) of each spring of all robots."""
-        return np.repeat(np.arange(len(self.ids)), self.counts)
-
-    @property
     def all_springs(self) -> np.ndarray:
         """Ends of the springs of all robots, counted within the robot, (sum of counts, 2)."""
         return np.tile(self.springs, (len(self.ids), 1)) if self.shared else self.springs
@@ -113,15 +108,24 @@ def longest_springs(strip: Strip) -> np.ndarray:
 
     The largest of the initial lengths and of the rest lengths plus amplitudes.
     """
-    owner, fields = strip.owner, strip.fields
-    ends = strip.all_springs + (np.cumsum(strip.masses) - strip.masses)[owner, None]
-    positions = fields["positions"]
-    lengths = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
-    longest = np.zeros(len(strip.ids))
-    np.maximum.at(
-        longest, owner, np.maximum(lengths, fields["rest_length"] + np.abs(fields["amplitude"]))
+    fields = strip.fields
+    first_mass = np.repeat(np.cumsum(strip.masses) - strip.masses, strip.counts)
+    start, end = strip.all_springs.T.astype(np.intp) + first_mass
+    d = fields["positions"].take(end, axis=0)
+    d -= fields["positions"].take(start, axis=0)
+    initial = np.sqrt(_largest(np.einsum("ij,ij->i", d, d), strip.counts))
+    return np.maximum(
+        initial, _largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
     )
-    return longest
+
+
+def _largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The largest of each run of ``counts`` non-negative values; 0 for an empty run."""
+    largest = np.zeros(len(counts))
+    some = counts > 0
+    if some.any():
+        largest[some] = np.maximum.reduceat(values, (np.cumsum(counts) - counts)[some])
+    return largest
 
 
 def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:

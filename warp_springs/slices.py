@@ -11,7 +11,8 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
-from warp_springs.kernels.lanes import BUNDLE, kernels
+from warp_springs.kernels.buffers import BUNDLE, structs
+from warp_springs.kernels.lanes import kernels
 from warp_springs.packing import aligned
 
 __all__ = ["Slice", "Tape", "cut", "run_all"]
@@ -63,16 +64,16 @@ class Slice:
         advance, observe = kernels(group.features)
         real = np.dtype(group.features.precision)
         scratch = np.zeros(3 * largest * group.features.width + SCRATCH_GAP, real)
-        self._arrays = {name: _on_device(values) for name, values in buffers.items()}
-        self._arrays["forces"] = _on_device(aligned([scratch], real))
-        self._everything = _on_device(np.arange(first, last, dtype=np.int32))
-        self._advance = self._record(advance, last - first, first_bundle=first)
-        self._observe = self._record(observe, last - first, which=self._everything)
-
-    def _record(self, kernel: wp.Kernel, dim: int, **own) -> wp.Launch:
-        names = [argument.label for argument in kernel.adj.args]
-        values = [own.get(name, self._arrays.get(name, 0)) for name in names]
-        return wp.launch(kernel, dim, inputs=values, device="cpu", record_cmd=True)
+        given = {
+            "forces": _on_device(aligned([scratch], real)),
+            "which": _on_device(np.arange(first, last, dtype=np.int32)),
+            "first_bundle": first,
+        }
+        for struct in structs(group.features.precision):
+            given[struct.key.lower()] = _filled(struct, buffers)
+        self._everything = given["which"]
+        self._advance = _recorded(advance, last - first, given)
+        self._observe = _recorded(observe, last - first, given)
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all bundles from ``first_step`` to ``last_step``."""
@@ -187,6 +188,20 @@ def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress
         except BaseException:
             stop.set()
             raise
+
+
+def _recorded(kernel: wp.Kernel, dim: int, given: Mapping[str, object]) -> wp.Launch:
+    """A launch with the given arguments; the others are set before each launch."""
+    inputs = [given.get(argument.label, 0) for argument in kernel.adj.args]
+    return wp.launch(kernel, dim, inputs=inputs, device="cpu", record_cmd=True)
+
+
+def _filled(struct, buffers: Mapping[str, np.ndarray]):
+    """A struct of the kernels over the flat buffers."""
+    instance = struct()
+    for name in struct.vars:
+        setattr(instance, name, _on_device(buffers[name]))
+    return instance
 
 
 def _on_device(values: np.ndarray) -> wp.array:

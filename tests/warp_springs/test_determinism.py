@@ -147,7 +147,7 @@ def test_contact_of_a_neighbour_leaves_the_smallest_velocity_alone(precision, fr
     scene = ws.Scene(ground=ws.Ground(friction=friction))
     flying = ws.Robot(
         masses=[0.1],
-        positions=[(0, 0, 1.0)],
+        positions=[(0.0, 0.0, 1.0)],
         velocities=[(tiny, -tiny, 0.0)],
         springs=np.empty((0, 2), dtype=int),
         stiffness=[],
@@ -156,7 +156,8 @@ def test_contact_of_a_neighbour_leaves_the_smallest_velocity_alone(precision, fr
     options = {"dt": DT, "precision": precision}
     lonely = ws.Simulation(flying, scene, **options).run(0.05)
     together = ws.Simulation([landed, flying, landed], scene, **options).run(0.05)
-    assert lonely.velocities(0)[0, 0] == pytest.approx(tiny)
+    assert lonely.positions(0)[0, 0] > 0.0
+    assert together.positions(1).tobytes() == lonely.positions(0).tobytes()
     assert together.velocities(1).tobytes() == lonely.velocities(0).tobytes()
 
 

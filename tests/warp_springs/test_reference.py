@@ -91,24 +91,28 @@ def compare(batch, scene, integrator, precision="float64"):
 @pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 @settings(max_examples=8)
-@given(batch=st.lists(robots(), min_size=1, max_size=4))
-def test_random_robots_follow_the_reference(scene, integrator, batch):
+@given(single=robots(), shared=robots())
+def test_random_robots_follow_the_reference(scene, integrator, single, shared):
+    # Robots of one topology are stepped together, in lanes; a robot that is the only one is not.
+    family = [shared.replace(stiffness=factor * shared.stiffness) for factor in (1.0, 0.8, 1.2)]
+    batch = [family[0], single, *family[1:]]
     position_errors, velocity_errors, margin = compare(batch, scene, integrator)
     assume(margin > 1e-9)
-    # Rounding is 1e-16 a step; 200 steps of stiff springs and contacts make 1e-12 of it at most.
-    assert position_errors.max() < 1e-9
-    assert velocity_errors.max() < 1e-9 * 10
+    # Rounding makes 3e-14 and 3e-13 of it, measured over these 200 steps.
+    assert position_errors.max() < 1e-11
+    assert velocity_errors.max() < 1e-10
 
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
 @pytest.mark.parametrize("name", ["free flight", "everything"])
 @settings(max_examples=3)
-@given(batch=st.lists(robots(), min_size=9, max_size=9))
+@given(batch=st.lists(robots(), min_size=7, max_size=7))
 def test_single_precision_follows_the_reference(name, integrator, batch):
     # The median over robots: a robot whose friction decides otherwise may go its own way.
     position_errors, velocity_errors, _ = compare(batch, SCENES[name], integrator, "float32")
-    assert np.median(position_errors) < 5e-5
-    assert np.median(velocity_errors) < 5e-4
+    # Measured: 1.6e-6 and 7e-6, some twenty roundings of 6e-8.
+    assert np.median(position_errors) < 1e-5
+    assert np.median(velocity_errors) < 5e-5
 
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
@@ -121,5 +125,5 @@ def test_walker_follows_the_reference_across_landing_and_runs(walker, integrator
     positions, velocities = trial.run(1000)
     assert positions[:, :, 2].min() < 0 < positions[0, :, 2].min()
     assert trial.margin > 1e-9
-    assert np.abs(result.positions(0) - positions[-1]).max() < 1e-10
-    assert np.abs(result.velocities(0) - velocities[-1]).max() < 1e-8
+    assert np.abs(result.positions(0) - positions[-1]).max() < 1e-11
+    assert np.abs(result.velocities(0) - velocities[-1]).max() < 1e-9

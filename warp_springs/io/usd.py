@@ -55,9 +55,10 @@ def export_usd(
     Xform over a UsdSkel body with a joint for each mass: bars coloured by stress (white neutral,
     red tension, blue compression; the robot's custom data say in ``stressScale`` [N] what the full
     colour means), balls at the masses, its exterior faces as a skin. A scene with a ground gets a
-    checker floor at z = 0; a camera sees every robot in every frame. A robot that was stopped
-    stays as it was; its custom data say when and why. The version and the parameters of the
-    simulation are in the layer's custom data, under ``warp_springs``.
+    checker floor, drawn below z = 0 by the radius of a ball so that balls rest on it; a camera
+    sees every robot in every frame. A robot that was stopped stays as it was; its custom data say
+    when and why. The version and the parameters of the simulation are in the layer's custom data,
+    under ``warp_springs``.
 
     The file appears whole or not at all: it is written beside its place and then renamed.
 
@@ -112,11 +113,13 @@ def _write(
     stage.GetRootLayer().customLayerData = {"warp_springs": _provenance(result)}
     looks = usd_stage.add_looks(stage)
     boxes = np.stack([item.box for item in tracks]) + offsets[:, None]
+    distance = usd_stage.add_camera(stage, boxes)
     if result.scene.ground is not None:
-        sizes = [np.linalg.norm(item.high[0] - item.low[0]) for item in tracks]
-        usd_stage.add_ground(stage, looks, boxes, float(np.median(sizes)))
+        size = float(np.median([np.linalg.norm(item.high[0] - item.low[0]) for item in tracks]))
+        middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
+        ball = max(item.ball for item in tracks)
+        usd_stage.add_ground(stage, looks, middle, distance, size, ball)
     usd_stage.add_lights(stage)
-    usd_stage.add_camera(stage, boxes)
     prims = unique_names([item.index for item in tracks], names, usd_stage.SCENERY)
     saver = _Saver(stage)
     for item, offset, prim in zip(tracks, offsets, prims, strict=True):
@@ -140,20 +143,24 @@ def _write_motion(
     """Write one robot in blocks of frames; returns the tension of the full colour [N]."""
     from warp_springs.io.usd_skel import SkelRobot
 
-    robot = item.robot
     frames = np.asarray(result.frames(item.index))
     sample = _spread(len(frames), _SCALE_FRAMES)
-    scale = appearance.stress_scale(robot.tension(frames[item.source[sample]], item.times[sample]))
-    writer = SkelRobot(xform, robot, looks)
-    bytes_a_frame = writer.bytes_a_frame
-    step = max(1, _BLOCK_BYTES // bytes_a_frame)
+    scale = appearance.stress_scale(_tension(item, frames, sample))
+    writer = SkelRobot(xform, item.robot, looks)
+    step = max(1, _BLOCK_BYTES // writer.bytes_a_frame)
     for first in range(0, len(frames), step):
-        block = slice(first, first + step)
-        positions = frames[item.source[block]].astype(np.float64)
-        tension = robot.tension(positions, item.times[block])
-        writer.write(first, positions + offset, appearance.stress_index(tension, scale))
-        saver.wrote(len(positions) * bytes_a_frame)
+        block = np.arange(first, min(first + step, len(frames)))
+        positions = frames[item.source[block]].astype(np.float64) + offset
+        stress = appearance.stress_index(_tension(item, frames, block), scale)
+        writer.write(first, positions, stress)
+        saver.wrote(len(block) * writer.bytes_a_frame)
     return scale
+
+
+def _tension(item: Track, frames: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Tensions [N] in the frames shown, (len(shown), S); an absurd stiffness may overflow."""
+    with np.errstate(over="ignore"):
+        return item.robot.tension(frames[item.source[shown]], item.times[shown])
 
 
 def _provenance(result: Result) -> dict[str, Any]:

@@ -37,6 +37,7 @@ class Track:
             positions repeats the last good one.
         low: Lowest corner of its box in each frame [m], shape (F, 3).
         high: Highest corner of its box in each frame [m], shape (F, 3).
+        ball: Radius of the balls at its masses [m].
     """
 
     index: int
@@ -45,6 +46,7 @@ class Track:
     source: NDArray[np.int64]
     low: FloatArray
     high: FloatArray
+    ball: float
 
     @property
     def held_frames(self) -> int:
@@ -103,10 +105,12 @@ def track(result: Result, index: int) -> Track:
     source = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))
     source = np.maximum(source, good.argmax())
     shown = frames[source] if not good.all() else frames
-    reach = max(appearance.drawn_radii(robot.lengths))
+    bar, ball = appearance.drawn_radii(robot.lengths)
+    reach = max(bar, ball)
     # A robot that was stopped no longer moves, and neither does its actuation.
     times = np.fmin(np.asarray(result.times, dtype=np.float64), result.status_time[index])[source]
-    return Track(index, robot, times, source, shown.min(axis=1) - reach, shown.max(axis=1) + reach)
+    low, high = shown.min(axis=1) - reach, shown.max(axis=1) + reach
+    return Track(index, robot, times, source, low, high, ball)
 
 
 def placed(tracks: Sequence[Track], spacing: float | None) -> FloatArray:

@@ -46,7 +46,7 @@ class SkelRobot:
         bar, ball = appearance.drawn_radii(robot.lengths)
         self._reach = 1.001 * max(bar, ball)
         self._turned: FloatArray | None = None
-        self._shown_colors: NDArray[np.int32] | None = None
+        self._shown_stress: NDArray[np.int32] | None = None
 
         self._translate, self._orient = xform.AddTranslateOp(), xform.AddOrientOp()
         self._root = UsdSkel.Root.Define(self._stage, self._child(xform.GetPath(), "body"))
@@ -103,11 +103,12 @@ class SkelRobot:
         """Colour indices hold until the next sample: frames without a change need none."""
         if self._colors is None:
             return
+        before = stress[:1] - 1 if self._shown_stress is None else self._shown_stress
+        changed = (np.diff(stress, axis=0, prepend=before) != 0).any(axis=1)
         faces = np.repeat(stress, TUBE_SIDES, axis=1)
-        for k, colors in enumerate(stress):
-            if self._shown_colors is None or not np.array_equal(colors, self._shown_colors):
-                self._colors.Set(Vt.IntArray.FromNumpy(faces[k]), first + k)
-                self._shown_colors = colors
+        for k in np.flatnonzero(changed).tolist():
+            self._colors.Set(Vt.IntArray.FromNumpy(faces[k]), first + k)
+        self._shown_stress = stress[-1:]
 
     def _add_skeleton(self) -> tuple[UsdSkel.Skeleton, UsdSkel.Animation]:
         """A joint for each mass, all of them roots, at rest where the body's masses are."""

@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt  # noqa: TID253
 
 from warp_springs.io.usd_geometry import checker
 from warp_springs.view import appearance
+from warp_springs.view.camera import Camera
 
 FloatArray = NDArray[np.float64]
 
@@ -22,8 +23,7 @@ SCENERY = ("World", "Robots", "Looks", "Ground", "Lights", "Key", "Sky", "Camera
 
 _LOOKS = WORLD.AppendChild("Looks")
 _STRESS_PRIMVAR = "displayColor"
-_MARGIN = 1.1
-"""Width of the picture over the width of what it has to show."""
+_FLOOR_PER_DISTANCE = 2.8
 _MOST_TILES = 80
 """Between the middle of the floor and its edge."""
 
@@ -99,17 +99,23 @@ def constant_color(mesh: UsdGeom.Mesh, color: ArrayLike) -> None:
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(vec3f([color]))
 
 
-def add_ground(stage: Usd.Stage, looks: Looks, boxes: FloatArray, size: float) -> None:
-    """The plane z = 0 as a checker of two materials, far around the boxes, (R, 2, 3) [m].
+def add_ground(
+    stage: Usd.Stage, looks: Looks, middle: FloatArray, distance: float, size: float, ball: float
+) -> None:
+    """The floor z = 0 as a checker of two materials.
 
-    The tiles are a round length somewhat below the size of a body [m].
+    Args:
+        stage: Where to put it.
+        looks: The materials of the stage.
+        middle: Point around which it lies [m], shape (3,).
+        distance: How far from there the camera stands [m]; the floor fills its picture.
+        size: Length of a body [m]; the tiles are a round length somewhat below it.
+        ball: Radius of a ball [m]; the floor is drawn lower by it, so that balls rest on it.
     """
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    middle = 0.5 * (low + high)[:2]
-    half = 2.5 * float(np.linalg.norm(high - low))
+    half = _FLOOR_PER_DISTANCE * distance
     tile = _round_length(max(0.7 * size, half / _MOST_TILES))
     points, quads, dark = checker(int(np.ceil(half / tile)), tile)
-    points[:, :2] += tile * np.rint(middle / tile)
+    points += [*(tile * np.rint(middle[:2] / tile)), -ball]
     ground = define_mesh(stage, WORLD.AppendChild("Ground"), points, quads)
     Usd.ModelAPI(ground).SetKind("component")
     constant_color(ground, appearance.GROUND_LIGHT)
@@ -137,30 +143,21 @@ def add_lights(stage: Usd.Stage) -> None:
     sky.CreateColorAttr(Gf.Vec3f(*appearance.SKY))
 
 
-def add_camera(stage: Usd.Stage, boxes: FloatArray) -> None:
-    """A camera that sees every box, (R, 2, 3) [m], entirely, from the front and above."""
+def add_camera(stage: Usd.Stage, boxes: FloatArray) -> float:
+    """A camera that sees all of every box, (R, 2, 3) [m]; returns how far it stands from them."""
     corners = np.concatenate([boxes[:, pick, range(3)] for pick in np.ndindex(2, 2, 2)])
+    view = Camera.framing(corners, (16, 9), margin=1.1)
+    focal_length = 40.0
+    height = 2.0 * focal_length * float(np.tan(np.radians(view.field_of_view) / 2.0))
     camera = UsdGeom.Camera.Define(stage, WORLD.AppendChild("Camera"))
-    aperture, focal_length = np.array([36.0, 20.25]), 40.0
-    camera.CreateHorizontalApertureAttr(float(aperture[0]))
-    camera.CreateVerticalApertureAttr(float(aperture[1]))
     camera.CreateFocalLengthAttr(focal_length)
-
-    ahead = _unit(np.array([-0.45, 0.85, -0.5]))
-    right = _unit(np.cross(ahead, (0.0, 0.0, 1.0)))
-    across = np.stack([right, np.cross(right, ahead)])
-    # A corner at depth z along the view and x aside is seen where |x - aim| <= slope (distance + z)
-    slope = 0.5 * aperture / focal_length / _MARGIN
-    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    aside, depth = (corners - middle) @ across.T, slope * ((corners - middle) @ ahead)[:, None]
-    highest, lowest = (aside - depth).max(axis=0), (aside + depth).min(axis=0)
-    distance = float(((highest - lowest) / (2.0 * slope)).max())
-    middle = middle + 0.5 * (highest + lowest) @ across
-    eye = Gf.Vec3d(*(middle - distance * ahead))
-    look = Gf.Matrix4d().SetLookAt(eye, Gf.Vec3d(*middle), Gf.Vec3d(0, 0, 1))
+    camera.CreateVerticalApertureAttr(height)
+    camera.CreateHorizontalApertureAttr(height * 16.0 / 9.0)
+    look = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*view.eye), Gf.Vec3d(*view.target), Gf.Vec3d.ZAxis())
     camera.AddTransformOp().Set(look.GetInverse())
-    camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * distance, 50.0 * distance))
-    camera.CreateFocusDistanceAttr(distance)
+    camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * view.distance, 50.0 * view.distance))
+    camera.CreateFocusDistanceAttr(view.distance)
+    return view.distance
 
 
 def vec3f(rows: ArrayLike) -> Vt.Vec3fArray:
@@ -201,10 +198,6 @@ def _read_color(
     output = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
     surface = UsdShade.Shader(stage.GetPrimAtPath(material.GetPath().AppendChild("Surface")))
     surface.GetInput("diffuseColor").ConnectToSource(output)
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    return vector / np.linalg.norm(vector)
 
 
 def _round_length(length: float) -> float:

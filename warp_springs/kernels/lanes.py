@@ -19,25 +19,14 @@ from typing import NamedTuple
 
 import warp as wp
 
+from warp_springs.kernels.buffers import BUNDLE, structs
+from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.law import CONSTANTS, LAW
 
-__all__ = ["BUNDLE", "CHECK_EVERY", "Features", "Kernels", "kernels", "native_width"]
+__all__ = ["CHECK_EVERY", "Features", "Kernels", "kernels"]
 
-# Columns of the table of bundles. Offsets count elements of the flat buffers.
-BUNDLE = (
-    "state",  # positions, velocities and their last good copies: [3 M][W]
-    "mass",  # inverse masses: [M][W]
-    "spring",  # spring coefficients: [S][2 or 4][W]
-    "lane",  # one value a lane: [W]
-    "row",  # row starts, M + 1 of them, counted from 0
-    "partner",  # the higher mass of each spring, S of them
-    "masses",
-    "springs",
-    "substeps",  # of the contact flow
-)
-
-# Health is checked, and the oscillators are set anew, every so many steps, counted from the start
-# of the simulation: 64 steps cost about 0.5 % and let the rotation err by less than 1e-14.
+#: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
+#: of the simulation.
 CHECK_EVERY = 64
 
 COMPILER_OPTIONS = {
@@ -73,38 +62,7 @@ class Kernels(NamedTuple):
     observe: wp.Kernel
 
 
-@wp.func_native("""
-#if defined(__AVX512F__)
-return 64;
-#elif defined(__AVX__)
-return 32;
-#else
-return 16;
-#endif
-""")
-def register_bytes() -> int: ...
-
-
-@wp.kernel(module="warp_springs_registers", enable_backward=False)
-def _measure(
-    # outputs
-    size: wp.array(dtype=wp.int32),
-):
-    size[0] = register_bytes()
-
-
-@functools.cache
-def native_width(precision: str) -> int:
-    """Robots a bundle: the lanes of one vector register, as Warp's compiler targets them."""
-    size = wp.zeros(1, dtype=wp.int32, device="cpu")
-    wp.launch(_measure, 1, outputs=[size], device="cpu")
-    return int(size.numpy()[0]) // (4 if precision == "float32" else 8)
-
-
-def _dialect(features: Features) -> str:
-    scalar, integer, size = (
-        ("float", "int", 4) if features.precision == "float32" else ("double", "long long", 8)
-    )
+def _preamble(features: Features) -> str:
     flags = {
         "ACTUATED": features.actuated,
         "GROUND": features.ground,
@@ -114,100 +72,38 @@ def _dialect(features: Features) -> str:
         "DRAG": features.drag,
         "EULER": features.integrator == "euler",
     }
-    return f"""
-    #pragma clang fp contract(on)
-    typedef {scalar} scalar;
-    typedef {integer} integer;
-    typedef scalar real __attribute__((vector_size({size * features.width})));
-    typedef integer mask __attribute__((vector_size({size * features.width})));
-    const int W = {features.width};
-    const scalar TINY = {"1e-30f" if features.precision == "float32" else "1e-200"};
-    const real zero = {{}};
-    {"".join(f"const bool {name} = {str(on).lower()};" for name, on in flags.items())}
-    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
-    auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
-    auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
-    """ + _INVERSE_ROOT[features.precision] + """
-    """ + "".join(
-        f"const scalar {name} = scalar(constants.data[{i}]);" for i, name in enumerate(CONSTANTS)
-    )
+    lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
+    lines += [
+        f"const scalar {name} = scalar(model.constants.data[{i}]);"
+        for i, name in enumerate(CONSTANTS)
+    ]
+    lines += [
+        f"const int64_t {column}_ = model.bundles.data[bundle * {len(BUNDLE)} + {i}];"
+        for i, column in enumerate(BUNDLE)
+    ]
+    lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
+    return vector_dialect(features.precision, features.width) + "\n".join(lines) + LAW + _BUNDLE
 
-
-# 1 / sqrt(a): the processor's estimate (relative error e below 2^-14), then the series of
-# (1 - h)^(-1/2) with h = 1 - a y^2 = 2 e: to h^1 for float32 (2^-28) and to h^3 for float64 (2^-56).
-# Exact square root and division cost two to three times as much, and serve where it is missing.
-_INVERSE_ROOT = {
-    "float32": r"""
-    auto inverse_root = [](real a) __attribute__((always_inline)) -> real {
-    #if defined(__AVX512F__) && defined(__AVX512VL__)
-        typedef float v4 __attribute__((vector_size(16)));
-        typedef float v16 __attribute__((vector_size(64)));
-        real y;
-        if (W == 16) {
-            v16 whole; __builtin_memcpy(&whole, &a, sizeof(a));
-            whole = __builtin_ia32_rsqrt14ps512_mask(whole, whole, (unsigned short)-1);
-            __builtin_memcpy(&y, &whole, sizeof(y));
-        } else {
-            for (int l = 0; l < W; ++l) {
-                v4 one = {a[l], 1.0f, 1.0f, 1.0f};
-                one = __builtin_ia32_rsqrt14ps128_mask(one, one, (unsigned char)-1);
-                y[l] = one[0];
-            }
-        }
-        return y + y * (scalar(0.5) * (scalar(1) - (a * y) * y));
-    #else
-        return scalar(1) / __builtin_elementwise_sqrt(a);
-    #endif
-    };
-    """,
-    "float64": r"""
-    auto inverse_root = [](real a) __attribute__((always_inline)) -> real {
-    #if defined(__AVX512F__) && defined(__AVX512VL__)
-        typedef double v2 __attribute__((vector_size(16)));
-        typedef double v8 __attribute__((vector_size(64)));
-        real y;
-        if (W == 8) {
-            v8 whole; __builtin_memcpy(&whole, &a, sizeof(a));
-            whole = __builtin_ia32_rsqrt14pd512_mask(whole, whole, (unsigned char)-1);
-            __builtin_memcpy(&y, &whole, sizeof(y));
-        } else {
-            for (int l = 0; l < W; ++l) {
-                v2 one = {a[l], 1.0};
-                one = __builtin_ia32_rsqrt14pd128_mask(one, one, (unsigned char)-1);
-                y[l] = one[0];
-            }
-        }
-        const real h = scalar(1) - (a * y) * y;
-        return y + y * (h * (scalar(0.5) + h * (scalar(0.375) + h * scalar(0.3125))));
-    #else
-        return scalar(1) / __builtin_elementwise_sqrt(a);
-    #endif
-    };
-    """,
-}
 
 # What both kernels need: the blocks of one bundle, one row of springs, its health.
-_BUNDLE = "".join(
-    f"const int64_t {column}_ = bundles.data[bundle * {len(BUNDLE)} + {i}];"
-    for i, column in enumerate(BUNDLE)
-) + r"""
+_BUNDLE = r"""
 const int M = (int)masses_, S = (int)springs_, substeps = (int)substeps_;
-Vec* const x = (Vec*)(positions.data + state_);
-Vec* const v = (Vec*)(velocities.data + state_);
-Vec* const good_x = (Vec*)(good_positions.data + state_);
-Vec* const good_v = (Vec*)(good_velocities.data + state_);
-const real* const w = (const real*)(inverse_masses.data + mass_);
-const real* const p = (const real*)(coefficients.data + spring_);
-const int* const row = rows.data + row_;
-const int* const partner = partners.data + partner_;
-real& sine = *(real*)(oscillators.data + 4 * lane_);
-real& cosine = *(real*)(oscillators.data + 4 * lane_ + W);
-const real turn_cosine = *(const real*)(oscillators.data + 4 * lane_ + 2 * W);
-const real turn_sine = *(const real*)(oscillators.data + 4 * lane_ + 3 * W);
-const real reach2 = *(const real*)(reaches2.data + lane_);
-int* const state = states.data + lane_;
-int* const state_step = state_steps.data + lane_;
-Vec* const F = (Vec*)(forces.data + scratch);
+Vec* const x = (Vec*)(state.positions.data + state_);
+Vec* const v = (Vec*)(state.velocities.data + state_);
+Vec* const good_x = (Vec*)(state.good_positions.data + state_);
+Vec* const good_v = (Vec*)(state.good_velocities.data + state_);
+const real* const w = (const real*)(model.inverse_masses.data + mass_);
+const real* const p = (const real*)(model.coefficients.data + spring_);
+const int* const row = model.rows.data + row_;
+const int* const partner = model.partners.data + partner_;
+real& sine = *(real*)(state.oscillators.data + 4 * lane_);
+real& cosine = *(real*)(state.oscillators.data + 4 * lane_ + W);
+const real turn_cosine = *(const real*)(state.oscillators.data + 4 * lane_ + 2 * W);
+const real turn_sine = *(const real*)(state.oscillators.data + 4 * lane_ + 3 * W);
+const real reach2 = *(const real*)(model.reaches2.data + lane_);
+int* const health = state.states.data + lane_;
+int* const health_step = state.state_steps.data + lane_;
+Vec* const F = (Vec*)forces.data;
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
@@ -250,7 +146,7 @@ auto diagnose = [=]() -> mask {
 };
 auto stopped_lanes = [=]() -> mask {
     mask stopped;
-    for (int l = 0; l < W; ++l) stopped[l] = state[l] != 0 ? -1 : 0;
+    for (int l = 0; l < W; ++l) stopped[l] = health[l] != 0 ? -1 : 0;
     return stopped;
 };
 """
@@ -262,7 +158,7 @@ auto check = [&](int n) {
     const mask reason = diagnose() & ~stopped;
     if (any(reason != 0)) {
         for (int l = 0; l < W; ++l)
-            if (reason[l] != 0) { state[l] = (int)reason[l]; state_step[l] = n; }
+            if (reason[l] != 0) { health[l] = (int)reason[l]; health_step[l] = n; }
         stopped = stopped_lanes();
     }
     if (any(stopped)) {
@@ -279,7 +175,7 @@ auto check = [&](int n) {
 };
 auto set_oscillators = [&](int n) {
     for (int l = 0; l < W; ++l) {
-        const double angle = omegas.data[lane_ + l] * (double(n) * constants.data[0]);
+        const double angle = model.omegas.data[lane_ + l] * (double(n) * model.constants.data[0]);
         sine[l] = scalar(::sin(angle)); cosine[l] = scalar(::cos(angle));
     }
 };
@@ -311,19 +207,19 @@ for (int n = first_step; n < last_step; ++n) {
 """
 
 _OBSERVE = r"""
-Vec* const seen_x = (Vec*)(seen_positions.data + state_);
-Vec* const seen_v = (Vec*)(seen_velocities.data + state_);
-real* const com = (real*)(seen_centers.data + 3 * lane_);
-real* const energy = (real*)(seen_energies.data + 4 * lane_);
-int* const seen_state = seen_states.data + lane_;
-int* const seen_step = seen_state_steps.data + lane_;
+Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
+Vec* const seen_v = (Vec*)(seen.seen_velocities.data + state_);
+real* const com = (real*)(seen.seen_centers.data + 3 * lane_);
+real* const energy = (real*)(seen.seen_energies.data + 4 * lane_);
+int* const seen_state = seen.seen_states.data + lane_;
+int* const seen_step = seen.seen_state_steps.data + lane_;
 
 const mask before = stopped_lanes();
 const mask reason = diagnose() & ~before;
 const mask stopped = before | (reason != 0);
 for (int l = 0; l < W; ++l) {
-    seen_state[l] = state[l] != 0 ? state[l] : (int)reason[l];
-    seen_step[l] = state[l] != 0 ? state_step[l] : reason[l] != 0 ? step : -1;
+    seen_state[l] = health[l] != 0 ? health[l] : (int)reason[l];
+    seen_step[l] = health[l] != 0 ? health_step[l] : reason[l] != 0 ? step : -1;
 }
 
 real total_mass = zero, cx = zero, cy = zero, cz = zero;
@@ -360,138 +256,57 @@ energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = groun
 
 @functools.cache
 def kernels(features: Features) -> Kernels:
-    """Compile-time specialised kernels; the first use of a specialisation compiles it (seconds)."""
+    """Kernels specialised on features; the first use of a specialisation compiles it (seconds)."""
     real = wp.float32 if features.precision == "float32" else wp.float64
-    common = _dialect(features) + LAW + f"const int CHECK_EVERY = {CHECK_EVERY};" + _BUNDLE
+    Model, State, Seen = structs(features.precision)
+    preamble = _preamble(features)
     # A named module of its own: compiling one specialisation leaves the others alone.
     module = wp.get_module(features.name)
     wp.set_module_options(COMPILER_OPTIONS, module)
 
-    @wp.func_native(common + _ADVANCE)
+    @wp.func_native(preamble + _ADVANCE)
     def advance_bundle(
-        bundle: int,
-        bundles: wp.array(dtype=wp.int64),
-        constants: wp.array(dtype=wp.float64),
-        rows: wp.array(dtype=wp.int32),
-        partners: wp.array(dtype=wp.int32),
-        inverse_masses: wp.array(dtype=real),
-        coefficients: wp.array(dtype=real),
-        omegas: wp.array(dtype=wp.float64),
-        reaches2: wp.array(dtype=real),
-        positions: wp.array(dtype=real),
-        velocities: wp.array(dtype=real),
-        good_positions: wp.array(dtype=real),
-        good_velocities: wp.array(dtype=real),
-        oscillators: wp.array(dtype=real),
-        states: wp.array(dtype=wp.int32),
-        state_steps: wp.array(dtype=wp.int32),
+        model: Model,
+        state: State,
         forces: wp.array(dtype=real),
-        scratch: wp.int64,
+        bundle: int,
         first_step: int,
         last_step: int,
     ): ...
 
-    @wp.func_native(common + _OBSERVE)
+    @wp.func_native(preamble + _OBSERVE)
     def observe_bundle(
-        bundle: int,
-        bundles: wp.array(dtype=wp.int64),
-        constants: wp.array(dtype=wp.float64),
-        rows: wp.array(dtype=wp.int32),
-        partners: wp.array(dtype=wp.int32),
-        inverse_masses: wp.array(dtype=real),
-        coefficients: wp.array(dtype=real),
-        reaches2: wp.array(dtype=real),
-        positions: wp.array(dtype=real),
-        velocities: wp.array(dtype=real),
-        good_positions: wp.array(dtype=real),
-        good_velocities: wp.array(dtype=real),
-        oscillators: wp.array(dtype=real),
-        states: wp.array(dtype=wp.int32),
-        state_steps: wp.array(dtype=wp.int32),
+        model: Model,
+        state: State,
         forces: wp.array(dtype=real),
-        scratch: wp.int64,
+        bundle: int,
         step: int,
         energy_wanted: bool,
-        seen_positions: wp.array(dtype=real),
-        seen_velocities: wp.array(dtype=real),
-        seen_centers: wp.array(dtype=real),
-        seen_energies: wp.array(dtype=real),
-        seen_states: wp.array(dtype=wp.int32),
-        seen_state_steps: wp.array(dtype=wp.int32),
+        seen: Seen,
     ): ...
 
     @wp.kernel(module=module)
     def advance(
-        # model
-        bundles: wp.array(dtype=wp.int64),
-        constants: wp.array(dtype=wp.float64),
-        rows: wp.array(dtype=wp.int32),
-        partners: wp.array(dtype=wp.int32),
-        inverse_masses: wp.array(dtype=real),
-        coefficients: wp.array(dtype=real),
-        omegas: wp.array(dtype=wp.float64),
-        reaches2: wp.array(dtype=real),
-        # state
-        positions: wp.array(dtype=real),
-        velocities: wp.array(dtype=real),
-        good_positions: wp.array(dtype=real),
-        good_velocities: wp.array(dtype=real),
-        oscillators: wp.array(dtype=real),
-        states: wp.array(dtype=wp.int32),
-        state_steps: wp.array(dtype=wp.int32),
-        # scratch
-        forces: wp.array(dtype=real),
-        scratch: wp.int64,
-        # scalars
+        model: Model,
+        state: State,
+        forces: wp.array(dtype=real),  # scratch
         first_bundle: int,
         first_step: int,
         last_step: int,
     ):
-        advance_bundle(
-            first_bundle + wp.tid(), bundles, constants, rows, partners, inverse_masses,
-            coefficients, omegas, reaches2, positions, velocities, good_positions,
-            good_velocities, oscillators, states, state_steps, forces, scratch,
-            first_step, last_step,
-        )  # fmt: skip
+        advance_bundle(model, state, forces, first_bundle + wp.tid(), first_step, last_step)
 
     @wp.kernel(module=module)
     def observe(
-        # model
-        bundles: wp.array(dtype=wp.int64),
-        constants: wp.array(dtype=wp.float64),
-        rows: wp.array(dtype=wp.int32),
-        partners: wp.array(dtype=wp.int32),
-        inverse_masses: wp.array(dtype=real),
-        coefficients: wp.array(dtype=real),
-        reaches2: wp.array(dtype=real),
-        # state
-        positions: wp.array(dtype=real),
-        velocities: wp.array(dtype=real),
-        good_positions: wp.array(dtype=real),
-        good_velocities: wp.array(dtype=real),
-        oscillators: wp.array(dtype=real),
-        states: wp.array(dtype=wp.int32),
-        state_steps: wp.array(dtype=wp.int32),
-        # scratch
-        forces: wp.array(dtype=real),
-        scratch: wp.int64,
-        # scalars
+        model: Model,
+        state: State,
+        forces: wp.array(dtype=real),  # scratch
         which: wp.array(dtype=wp.int32),
         step: int,
         energy_wanted: bool,
         # outputs
-        seen_positions: wp.array(dtype=real),
-        seen_velocities: wp.array(dtype=real),
-        seen_centers: wp.array(dtype=real),
-        seen_energies: wp.array(dtype=real),
-        seen_states: wp.array(dtype=wp.int32),
-        seen_state_steps: wp.array(dtype=wp.int32),
+        seen: Seen,
     ):
-        observe_bundle(
-            which[wp.tid()], bundles, constants, rows, partners, inverse_masses, coefficients,
-            reaches2, positions, velocities, good_positions, good_velocities, oscillators,
-            states, state_steps, forces, scratch, step, energy_wanted, seen_positions,
-            seen_velocities, seen_centers, seen_energies, seen_states, seen_state_steps,
-        )  # fmt: skip
+        observe_bundle(model, state, forces, which[wp.tid()], step, energy_wanted, seen)
 
     return Kernels(advance, observe)

@@ -10,11 +10,13 @@ import warp as wp
 
 from warp_springs.kernels.raster import EMPTY, Lens
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "max_unroll": 0})
 
+SAMPLES = wp.constant(4)
+"""Samples in a pixel of a picture."""
 REACH = wp.constant(14)
 """Half the edge of the largest square over which a shadow's edge is blurred [texels]."""
-COLUMNS_A_THREAD = wp.constant(16)
+COLUMNS_A_THREAD = wp.constant(128)
 """Columns of the table of sums that one thread adds up: two lines of the cache."""
 
 _LONGEST_WAY = wp.constant(2000.0)  # in texels: the sum over 1024 x 1024 stays below 2^31
@@ -171,7 +173,6 @@ def hidden_at(sun: Sun, depths: wp.array(dtype=wp.uint64), x: float, y: float, z
 def shadow_on_surface(
     sun: Sun,
     depths: wp.array(dtype=wp.uint64),
-    disc: wp.array(dtype=wp.vec2),  # where to look, in texels
     p: wp.vec3,
     normal: wp.vec3,
 ):
@@ -180,10 +181,12 @@ def shadow_on_surface(
     q = sun.turn * (p + normal * (2.0 * texel)) + sun.shift
     x = sun.center + q[0] * sun.scale
     y = sun.center + q[1] * sun.scale
-    hidden = wp.float32(0.0)
-    for i in range(disc.shape[0]):
-        hidden += hidden_at(sun, depths, x + disc[i][0], y + disc[i][1], q[2] - texel)
-    return hidden / float(disc.shape[0])
+    z = q[2] - texel
+    hidden = hidden_at(sun, depths, x - 1.0, y - 1.0, z)
+    hidden += hidden_at(sun, depths, x + 1.0, y - 1.0, z)
+    hidden += hidden_at(sun, depths, x - 1.0, y + 1.0, z)
+    hidden += hidden_at(sun, depths, x + 1.0, y + 1.0, z)
+    return 0.25 * hidden
 
 
 @wp.func
@@ -235,7 +238,6 @@ def surface_color(
     sun: Sun,
     surfaces: Surfaces,
     depths: wp.array(dtype=wp.uint64),
-    disc: wp.array(dtype=wp.vec2),
     d: wp.vec3,
     depth: float,
     surface: int,
@@ -266,7 +268,7 @@ def surface_color(
     facing = wp.max(wp.dot(normal, sun.direction), 0.0)
     sunlight = wp.float32(0.0)
     if facing > 0.0:
-        sunlight = 1.0 - shadow_on_surface(sun, depths, disc, p, normal)
+        sunlight = 1.0 - shadow_on_surface(sun, depths, p, normal)
     from_above = 0.5 + 0.5 * wp.dot(normal, sun.up)
     skylight = wp.lerp(wp.vec3(0.30, 0.29, 0.28), wp.vec3(0.46, 0.50, 0.56), from_above)
     light = skylight + wp.vec3(0.74, 0.71, 0.66) * (facing * sunlight)
@@ -278,8 +280,8 @@ def surface_color(
     return wp.cw_mul(surfaces.colors[surface], light) + wp.vec3(white, white, white)
 
 
-@wp.kernel
-def shade(
+@wp.func
+def pixel_color(
     lens: Lens,
     offsets: wp.array(dtype=wp.vec2),
     sun: Sun,
@@ -287,25 +289,21 @@ def shade(
     surfaces: Surfaces,
     depths: wp.array(dtype=wp.uint64),
     sums: wp.array2d(dtype=wp.vec2i),
-    disc: wp.array(dtype=wp.vec2),
     keys: wp.array(dtype=wp.uint64),
-    encode: wp.array(dtype=wp.uint8),  # linear 0 ... 1 -> screen value
-    # outputs
-    picture: wp.array3d(dtype=wp.uint8),
+    x: int,
+    y: int,
 ):
-    """Shade each surface that a pixel's samples see once; it counts by its share of them."""
-    y, x = wp.tid()
-    n = offsets.shape[0]
-    first = y * n * lens.width + x
+    """Mean colour of a pixel; each surface that its samples see is shaded only once."""
+    first = y * SAMPLES * lens.width + x
     total = wp.vec3(0.0, 0.0, 0.0)
     done = wp.int32(0)
-    for s in range(n):
+    for s in range(SAMPLES):
         if (done >> s) & 1 == 0:
             key = keys[first + s * lens.width]
             count = wp.float32(0.0)
-            for other in range(s, n):
-                same = keys[first + other * lens.width] ^ key
-                if same & _SURFACE_BITS == wp.uint64(0):
+            for other in range(SAMPLES):
+                difference = keys[first + other * lens.width] ^ key
+                if difference & _SURFACE_BITS == wp.uint64(0):
                     done = done | (1 << other)
                     count += 1.0
             left = (float(x) + offsets[s][0] - lens.center_x) / lens.focal
@@ -315,10 +313,32 @@ def shade(
             ground = floor_depth(floor, sun, d)
             if depth <= ground:
                 surface = int(key & _SURFACE_BITS)
-                total += surface_color(sun, surfaces, depths, disc, d, depth, surface) * count
+                total += count * surface_color(sun, surfaces, depths, d, depth, surface)
             else:
-                total += background(lens, sun, floor, sums, d, ground) * count
+                total += count * background(lens, sun, floor, sums, d, ground)
+    return total / float(SAMPLES)
+
+
+@wp.kernel
+def shade(
+    lens: Lens,
+    offsets: wp.array(dtype=wp.vec2),
+    sun: Sun,
+    floor: Floor,
+    surfaces: Surfaces,
+    depths: wp.array(dtype=wp.uint64),
+    sums: wp.array2d(dtype=wp.vec2i),
+    keys: wp.array(dtype=wp.uint64),
+    encode: wp.array(dtype=wp.uint8),  # linear 0 ... 1 -> screen value
+    stride: int,
+    # outputs
+    picture: wp.array3d(dtype=wp.uint8),
+):
+    """Colour every stride-th pixel of a row: on a CPU whole rows, as a thread is costly there."""
+    y, start = wp.tid()
     brightest = float(encode.shape[0] - 1)
-    for channel in range(3):
-        value = wp.clamp(total[channel] / float(n), 0.0, 1.0) * brightest
-        picture[lens.first_row + y, x, channel] = encode[int(value + 0.5)]
+    for x in range(start, lens.width, stride):
+        color = pixel_color(lens, offsets, sun, floor, surfaces, depths, sums, keys, x, y)
+        for channel in range(3):
+            value = wp.clamp(color[channel], 0.0, 1.0) * brightest
+            picture[lens.first_row + y, x, channel] = encode[int(value + 0.5)]

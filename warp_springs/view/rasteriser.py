@@ -29,8 +29,6 @@ _BAND_ROWS = 90
 _CUDA_PARTS = 16
 _MAP_SIZE = 1024
 _SUN_SPREAD = 0.07
-_DISC_RADIUS = 2.0
-_DISC_POINTS = 8
 
 
 @dataclass(frozen=True)
@@ -89,10 +87,10 @@ class Rasteriser:
         on_cpu = self.device.is_cpu
         self._threads = (threads or _usable_cores()) if on_cpu else 1
         self._parts = 1 if on_cpu else _CUDA_PARTS
+        self._stride = 1 if on_cpu else width
         self._band_rows = min(_BAND_ROWS, height) if on_cpu else height
         self._samples = self._vectors(_SAMPLES)
         self._centre_of_pixel = self._vectors(((0.5, 0.5),))
-        self._disc = self._vectors(_DISC_RADIUS * _disc(_DISC_POINTS))
         self._encode = wp.array(_screen_values(), dtype=wp.uint8, device=self.device)
         self._picture = wp.zeros((height, width, 3), dtype=wp.uint8, device=self.device)
         keys = width * self._band_rows * len(_SAMPLES)
@@ -147,7 +145,7 @@ class Rasteriser:
         self._draw_shapes(lens, self._samples, surfaces.points, shapes, keys)
         wp.launch(
             shading.shade,
-            dim=(lens.rows, width),
+            dim=(lens.rows, self._stride),
             inputs=[
                 lens,
                 self._samples,
@@ -156,9 +154,9 @@ class Rasteriser:
                 surfaces,
                 self._map,
                 self._sums,
-                self._disc,
                 keys,
                 self._encode,
+                self._stride,
             ],
             outputs=[self._picture],
             device=self.device,
@@ -281,13 +279,6 @@ def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:
     floor.sky = wp.vec3(*appearance.SKY)
     floor.zenith = wp.vec3(*appearance.ZENITH)
     return floor
-
-
-def _disc(n: int) -> NDArray[np.float64]:
-    """Return n points spread evenly over the unit disc (Vogel's sunflower), (n, 2)."""
-    i = np.arange(n)
-    radius, angle = np.sqrt((i + 0.5) / n), i * np.pi * (3 - np.sqrt(5))
-    return np.column_stack((radius * np.cos(angle), radius * np.sin(angle)))
 
 
 def _screen_values(n: int = 4096) -> NDArray[np.uint8]:

@@ -1,0 +1,84 @@
+"""The flat buffers, declared once: packing, allocation and kernels all read these tables."""
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+import warp as wp
+
+__all__ = ["BUNDLE", "MODEL", "SEEN", "STATE", "Structs", "dtype_of", "structs"]
+
+REAL = "real"  # the precision of the run
+
+#: Columns of the table of bundles. Offsets count elements of the flat buffers.
+BUNDLE = (
+    "state",  # positions, velocities and their copies: [3 M][W]
+    "mass",  # inverse masses: [M][W]
+    "spring",  # spring coefficients: [S][2 or 4][W]
+    "lane",  # one value a lane: [W]
+    "row",  # row starts, M + 1 of them, counted from 0
+    "partner",  # the higher mass of each spring, S of them
+    "masses",
+    "springs",
+    "substeps",  # of the contact flow
+)
+
+#: What stays as it was packed.
+MODEL = {
+    "bundles": np.int64,  # the table of bundles, row by row
+    "constants": np.float64,  # of the run, see kernels.law
+    "rows": np.int32,
+    "partners": np.int32,
+    "inverse_masses": REAL,  # 1/kg
+    "coefficients": REAL,  # k, q, or k, qa, qs, qc of each sorted spring: N/m, N
+    "omegas": np.float64,  # rad/s
+    "reaches2": REAL,  # square of the length that stops a robot, m^2
+}
+
+#: What stepping changes.
+STATE = {
+    "positions": REAL,  # m
+    "velocities": REAL,  # m/s
+    "good_positions": REAL,  # at the last check that found the robot healthy
+    "good_velocities": REAL,
+    "oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt): four a lane
+    "states": np.int32,  # Status
+    "state_steps": np.int32,  # when it was found
+}
+
+#: What looking writes.
+SEEN = {
+    "seen_positions": REAL,
+    "seen_velocities": REAL,  # synchronised with the positions
+    "seen_centers": REAL,  # centre of mass: three a lane
+    "seen_energies": REAL,  # kinetic, gravity, spring, ground: four a lane, J
+    "seen_states": np.int32,
+    "seen_state_steps": np.int32,
+}
+
+
+class Structs(NamedTuple):
+    """The three tables as Warp structs of arrays, in one precision."""
+
+    model: type
+    state: type
+    seen: type
+
+
+def dtype_of(name: str, precision: str) -> np.dtype:
+    """Element type of a buffer."""
+    kind = (MODEL | STATE | SEEN)[name]
+    return np.dtype(precision if kind is REAL else kind)
+
+
+@functools.cache
+def structs(precision: str) -> Structs:
+    """The structs that kernels of a precision take."""
+
+    def struct(name: str, table: dict) -> type:
+        fields = {
+            key: wp.array(dtype=wp.dtype_from_numpy(dtype_of(key, precision))) for key in table
+        }
+        return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+
+    return Structs(struct("Model", MODEL), struct("State", STATE), struct("Seen", SEEN))

@@ -1,0 +1,96 @@
+"""The law's number type for a CPU: a vector register with a robot in each lane.
+
+The types are the compiler's own vector types, which stay in registers; a width of one is a vector
+of one lane, so that the same text serves robots that share their topology with nobody.
+"""
+
+import functools
+
+import warp as wp
+
+__all__ = ["native_width", "vector_dialect"]
+
+
+@wp.func_native("""
+#if defined(__AVX512F__)
+return 64;
+#elif defined(__AVX__)
+return 32;
+#else
+return 16;
+#endif
+""")
+def register_bytes() -> int: ...
+
+
+@wp.kernel(module="warp_springs_registers", enable_backward=False)
+def _measure(
+    # outputs
+    size: wp.array(dtype=wp.int32),
+):
+    size[0] = register_bytes()
+
+
+@functools.cache
+def native_width(precision: str) -> int:
+    """Lanes of one vector register, as Warp's compiler targets this processor."""
+    size = wp.zeros(1, dtype=wp.int32, device="cpu")
+    wp.launch(_measure, 1, outputs=[size], device="cpu")
+    return int(size.numpy()[0]) // (4 if precision == "float32" else 8)
+
+
+# Bytes of a scalar, the integer of its size, TINY, and the processor's estimate of 1 / sqrt(a):
+# its name, the lanes of a whole register, and its mask's type.
+_TYPES = {
+    "float32": ("float", "int", 4, "1e-30f", "rsqrt14ps", 16, "unsigned short"),
+    "float64": ("double", "long long", 8, "1e-200", "rsqrt14pd", 8, "unsigned char"),
+}
+
+# The estimate y of 1 / sqrt(a) errs by less than 2^-14. With h = 1 - a y^2 the series of
+# (1 - h)^(-1/2), to h for float32 and to h^3 for float64, leaves the last bit. Processors without
+# the estimate take square root and division.
+_SERIES = {
+    "float32": "y + y * (h * scalar(0.5))",
+    "float64": "y + y * (h * (scalar(0.5) + h * (scalar(0.375) + h * scalar(0.3125))))",
+}
+
+
+def vector_dialect(precision: str, width: int) -> str:
+    """C++ text that defines the names ``kernels.law`` asks a dialect for."""
+    scalar, integer, size, tiny, estimate, whole, bits = _TYPES[precision]
+    return f"""
+    #pragma clang fp contract(on)
+    typedef {scalar} scalar;
+    typedef {integer} integer;
+    typedef scalar real __attribute__((vector_size({size * width})));
+    typedef integer mask __attribute__((vector_size({size * width})));
+    const int W = {width};
+    const scalar TINY = {tiny};
+    const real zero = {{}};
+    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
+    auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
+    auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
+    auto inverse_root = [](real a) __attribute__((always_inline)) -> real {{
+    #if defined(__AVX512F__) && defined(__AVX512VL__)
+        typedef scalar part __attribute__((vector_size(16)));
+        typedef scalar whole __attribute__((vector_size({size * whole})));
+        real y;
+        if (W == {whole}) {{
+            whole all = {{}};
+            __builtin_memcpy(&all, &a, sizeof(a));
+            all = __builtin_ia32_{estimate}512_mask(all, all, ({bits})-1);
+            __builtin_memcpy(&y, &all, sizeof(y));
+        }} else {{
+            for (int l = 0; l < W; ++l) {{
+                part one = {{}};
+                one[0] = a[l];
+                y[l] = __builtin_ia32_{estimate}128_mask(one, one, (unsigned char)-1)[0];
+            }}
+        }}
+        const real h = scalar(1) - (a * y) * y;
+        return {_SERIES[precision]};
+    #else
+        return scalar(1) / __builtin_elementwise_sqrt(a);
+    #endif
+    }};
+    """
