@@ -17,6 +17,7 @@ import numpy as np
 from warp_springs.kernels.buffers import BUNDLE, dtype_of
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
+from warp_springs.kernels.law import DRIFTS
 from warp_springs.packing import (
     MASS_FIELDS,
     SPRING_FIELDS,
@@ -33,7 +34,7 @@ from warp_springs.variants import Variants
 
 __all__ = ["Batch", "Group", "Slots"]
 
-#: Steps of the contact flow within one step: no fewer, no more, if the caller does not choose.
+#: Steps of the contact flow within one drift: no fewer, no more, if the caller does not choose.
 SUBSTEPS = (8, 64)
 
 #: Buffers that are packed; all others are made by the simulation.
@@ -115,7 +116,7 @@ class Batch:
         dt: Step [s].
         precision: ``"float64"`` or ``"float32"``.
         integrator: ``"leapfrog"`` or ``"euler"``.
-        contact_substeps: Steps of the contact flow within one step, or ``None`` to choose them.
+        contact_substeps: Steps of the contact flow within one drift, or ``None`` to choose them.
         stretch: Limit on the length of a spring, see ``Limits.stretch``.
 
     Attributes:
@@ -137,8 +138,9 @@ class Batch:
         contact_substeps: int | None,
         stretch: float,
     ) -> None:
-        self._scene, self._dt, self._stretch = scene, dt, stretch
+        self._scene, self._stretch = scene, stretch
         self._precision, self._integrator = precision, integrator
+        self._span = dt / DRIFTS[integrator]
         self._fixed_substeps = contact_substeps
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
@@ -192,13 +194,13 @@ class Batch:
         """Contact sub-steps of robots whose lightest masses are given [kg].
 
         A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
-        oscillation, sqrt(K_G / m) dt, below a sixteenth of a radian a sub-step.
+        oscillation, sqrt(K_G / m) times one drift, below a sixteenth of a radian a sub-step.
         """
         if self._scene.ground is None or self._integrator == "euler":
             return np.ones(len(lightest), np.int64)
         if self._fixed_substeps is not None:
             return np.full(len(lightest), self._fixed_substeps, np.int64)
-        phase = np.sqrt(self._scene.ground.stiffness / lightest) * self._dt
+        phase = np.sqrt(self._scene.ground.stiffness / lightest) * self._span
         wanted = np.clip(16.0 * phase, *SUBSTEPS)
         return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
 
@@ -229,7 +231,7 @@ class Batch:
         order, row, partner = sort_rows(strip)
         longest = longest_springs(strip)
         reach = np.where(longest > 0.0, self._stretch * longest, np.inf)
-        turn = fields["omega"] * self._dt
+        turn = fields["omega"] * self._span
         start = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
         per_robot = {
             "inverse_masses": 1.0 / fields["masses"],

@@ -12,7 +12,7 @@ import numpy as np
 from warp_springs.batch import Batch
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
-from warp_springs.kernels.law import constants
+from warp_springs.kernels.law import EVALUATIONS, constants
 from warp_springs.packing import aligned
 from warp_springs.result import Result
 from warp_springs.robot import Robot
@@ -55,7 +55,7 @@ class Simulation:
         *,
         device: str = "cpu",
         precision: Literal["float64", "float32"] = "float64",
-        integrator: Literal["leapfrog", "euler"] = "leapfrog",
+        integrator: Literal["leapfrog", "euler", "chin4"] = "leapfrog",
         contact_substeps: int | None = None,
         threads: int | None = None,
         limits: Limits | None = None,
@@ -66,11 +66,11 @@ class Simulation:
         check_number("dt", dt, above=0.0)
         check_choice("device", str(device), ("cpu",))
         check_choice("precision", precision, ("float64", "float32"))
-        check_choice("integrator", integrator, ("leapfrog", "euler"))
+        check_choice("integrator", integrator, ("leapfrog", "euler", "chin4"))
         if contact_substeps is not None:
             _check_count("contact_substeps", contact_substeps)
             if integrator == "euler":
-                raise ValueError("contact_substeps: only 'leapfrog' has them, got 'euler'")
+                raise ValueError("contact_substeps: 'euler' has none")
         if threads is not None:
             _check_count("threads", threads)
         self.dt, self.device = float(dt), str(device)
@@ -149,7 +149,9 @@ class Simulation:
         batch, real = self._batch, np.dtype(self.precision)
         buffers = batch.arrays | {
             "bundles": batch.bundles.ravel(),
-            "constants": np.array(constants(self.scene, self.dt, self.limits.speed)),
+            "constants": np.array(
+                constants(self.scene, self.dt, self.integrator, self.limits.speed)
+            ),
         }
         for name in ("positions", "velocities"):
             buffers[f"good_{name}"] = aligned([buffers[name]], real)
@@ -205,7 +207,8 @@ class Simulation:
             times=np.array(frame_steps, np.float64) * self.dt,
             recorded=tuple(recorded.tolist()),
             energy=_energy(tapes, len(self.robots)),
-            spring_evaluations=int((slots.springs * (until - first)).sum()),
+            spring_evaluations=int((slots.springs * (until - first)).sum())
+            * EVALUATIONS[self.integrator],
             wall_time=wall_time,
             _slots=slots,
             _positions=buffers["seen_positions"].copy(),

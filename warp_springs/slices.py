@@ -12,7 +12,7 @@ import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.kernels.buffers import BUNDLE, structs
-from warp_springs.kernels.lanes import kernels
+from warp_springs.kernels.lanes import SCRATCH, kernels
 from warp_springs.packing import aligned
 
 __all__ = ["Slice", "Tape", "cut", "run_all"]
@@ -63,9 +63,9 @@ class Slice:
         self.buffers = buffers
         advance, observe = kernels(group.features)
         real = np.dtype(group.features.precision)
-        scratch = np.zeros(3 * largest * group.features.width + SCRATCH_GAP, real)
+        scratch = np.zeros(SCRATCH * largest * group.features.width + SCRATCH_GAP, real)
         given = {
-            "forces": _on_device(aligned([scratch], real)),
+            "scratch": _on_device(aligned([scratch], real)),
             "which": _on_device(np.arange(first, last, dtype=np.int32)),
             "first_bundle": first,
         }

@@ -23,7 +23,7 @@ from warp_springs.kernels.buffers import BUNDLE, structs
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.law import CONSTANTS, LAW
 
-__all__ = ["CHECK_EVERY", "Features", "Kernels", "kernels"]
+__all__ = ["CHECK_EVERY", "SCRATCH", "Features", "Kernels", "kernels"]
 
 #: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
 #: of the simulation.
@@ -55,6 +55,11 @@ class Features:
         return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
 
 
+#: Scratch values a lane of each mass: its force, and for chin4 where the gradient kick looks, and
+#: the impulse left over for friction.
+SCRATCH = 7
+
+
 class Kernels(NamedTuple):
     """The two kernels of a group: stepping, and looking without touching."""
 
@@ -71,6 +76,7 @@ def _preamble(features: Features) -> str:
         "DAMPING": features.damping,
         "DRAG": features.drag,
         "EULER": features.integrator == "euler",
+        "CHIN4": features.integrator == "chin4",
     }
     lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
     lines += [
@@ -103,15 +109,18 @@ const real turn_sine = *(const real*)(state.oscillators.data + 4 * lane_ + 3 * W
 const real reach2 = *(const real*)(model.reaches2.data + lane_);
 int* const health = state.states.data + lane_;
 int* const health_step = state.state_steps.data + lane_;
-Vec* const F = (Vec*)forces.data;
+Vec* const F = (Vec*)scratch.data;
+Vec* const shifted = F + M;
+real* const left_over = (real*)(shifted + M);
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
 auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
 };
-// The whole force on mass i; forces on later masses are left in F.
-auto row_force = [=](int i, real si, real co) __attribute__((always_inline)) -> Vec {
+// The whole force on mass i where the masses are at x; forces on later masses are left in F.
+auto row_force = [=](const Vec* x, int i, real si, real co)
+        __attribute__((always_inline)) -> Vec {
     const Vec a = x[i];
     Vec f = F[i];
     F[i] = Vec{zero, zero, zero};
@@ -180,28 +189,54 @@ auto set_oscillators = [&](int n) {
     }
 };
 
+// One kick by the springs as they pull at `where`, and the drift after it.
+auto kick_and_drift = [&](const Vec* where, scalar time, bool start, bool last)
+        __attribute__((always_inline)) {
+    const real si = sine, co = cosine;
+    for (int i = 0; i < M; ++i) {
+        const Vec f = row_force(where, i, si, co);
+        Vec a = x[i], u = v[i];
+        if (!start) lose_before(u, w[i]);
+        kick(u, f, w[i], a.z, time);
+        lose_after(u, w[i]);
+        real rest = CHIN4 && last ? left_over[i] : zero;
+        drift(a, u, w[i], substeps, rest, last);
+        if (CHIN4 && !last) left_over[i] = rest;
+        x[i] = a; v[i] = u;
+    }
+};
+auto turn_oscillators = [&]() __attribute__((always_inline)) {
+    const real si = sine, co = cosine;
+    sine = si * turn_cosine + co * turn_sine;
+    cosine = co * turn_cosine - si * turn_sine;
+};
+
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
 for (int n = first_step; n < last_step; ++n) {
     if (n % CHECK_EVERY == 0) {
         check(n);
         if (ACTUATED) set_oscillators(n);
     }
-    const bool first = n == 0;
-    const scalar kick = first ? dt * scalar(0.5) : dt;
-    const real si = sine, co = cosine;
-    for (int i = 0; i < M; ++i) {
-        const Vec f = row_force(i, si, co);
-        Vec a = x[i], u = v[i];
-        if (EULER) euler_step(a, u, f, w[i]);
-        else {
-            leapfrog_kick(u, f, w[i], a.z, !first, kick, true);
-            leapfrog_drift(a, u, w[i], substeps);
+    const bool start = n == 0;
+    if (EULER) {
+        for (int i = 0; i < M; ++i) {
+            const Vec f = row_force(x, i, sine, cosine);
+            Vec a = x[i], u = v[i];
+            euler_step(a, u, f, w[i]);
+            x[i] = a; v[i] = u;
         }
-        x[i] = a; v[i] = u;
+    } else {
+        kick_and_drift(x, start ? FIRST_KICK : FIRST_KICK * scalar(2), start, !CHIN4);
     }
-    if (ACTUATED) {
-        sine = si * turn_cosine + co * turn_sine;
-        cosine = co * turn_cosine - si * turn_sine;
+    if (ACTUATED) turn_oscillators();
+    if (CHIN4) {
+        for (int i = 0; i < M; ++i) {
+            const Vec a = kick_acceleration(row_force(x, i, sine, cosine), w[i]), b = x[i];
+            shifted[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
+                             b.z + a.z * GRADIENT_SHIFT};
+        }
+        kick_and_drift(shifted, GRADIENT_KICK, false, true);
+        if (ACTUATED) turn_oscillators();
     }
 }
 """
@@ -226,10 +261,10 @@ real total_mass = zero, cx = zero, cy = zero, cz = zero;
 real kinetic = zero, gravity = zero, springs = zero, ground = zero;
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
 for (int i = 0; i < M; ++i) {
-    const Vec f = row_force(i, sine, cosine);
+    const Vec f = row_force(x, i, sine, cosine);
     Vec a = x[i], u = v[i];
     const Vec b = good_x[i], good = good_v[i];
-    if (!EULER && step > 0) leapfrog_synchronise(u, f, w[i], a.z);
+    if (!EULER && step > 0) synchronise(u, f, w[i], a.z);
     a = Vec{select(stopped, b.x, a.x), select(stopped, b.y, a.y), select(stopped, b.z, a.z)};
     u = Vec{select(stopped, good.x, u.x), select(stopped, good.y, u.y),
             select(stopped, good.z, u.z)};
@@ -268,7 +303,7 @@ def kernels(features: Features) -> Kernels:
     def advance_bundle(
         model: Model,
         state: State,
-        forces: wp.array(dtype=real),
+        scratch: wp.array(dtype=real),
         bundle: int,
         first_step: int,
         last_step: int,
@@ -278,7 +313,7 @@ def kernels(features: Features) -> Kernels:
     def observe_bundle(
         model: Model,
         state: State,
-        forces: wp.array(dtype=real),
+        scratch: wp.array(dtype=real),
         bundle: int,
         step: int,
         energy_wanted: bool,
@@ -289,24 +324,24 @@ def kernels(features: Features) -> Kernels:
     def advance(
         model: Model,
         state: State,
-        forces: wp.array(dtype=real),  # scratch
+        scratch: wp.array(dtype=real),
         first_bundle: int,
         first_step: int,
         last_step: int,
     ):
-        advance_bundle(model, state, forces, first_bundle + wp.tid(), first_step, last_step)
+        advance_bundle(model, state, scratch, first_bundle + wp.tid(), first_step, last_step)
 
     @wp.kernel(module=module)
     def observe(
         model: Model,
         state: State,
-        forces: wp.array(dtype=real),  # scratch
+        scratch: wp.array(dtype=real),
         which: wp.array(dtype=wp.int32),
         step: int,
         energy_wanted: bool,
         # outputs
         seen: Seen,
     ):
-        observe_bundle(model, state, forces, which[wp.tid()], step, energy_wanted, seen)
+        observe_bundle(model, state, scratch, which[wp.tid()], step, energy_wanted, seen)
 
     return Kernels(advance, observe)

@@ -22,12 +22,13 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["CONSTANTS", "LAW", "constants"]
+__all__ = ["CONSTANTS", "DRIFTS", "EVALUATIONS", "LAW", "constants"]
 
 # Host and kernel read the constants of a run from one array, in this order.
 CONSTANTS = (
     "dt",  # step [s]
-    "decay_half",  # exp(-damping dt / 2): damping over half a step
+    "span",  # one drift [s]
+    "decay",  # exp(-damping span / 2): damping over half a drift
     "gravity_x",  # [m/s^2]
     "gravity_y",
     "gravity_z",
@@ -39,12 +40,19 @@ CONSTANTS = (
 )
 
 
-def constants(scene, dt: float, speed_limit: float) -> list[float]:
+#: Drifts in a step of each integrator, and times it computes the spring forces.
+DRIFTS = {"euler": 1, "leapfrog": 1, "chin4": 2}
+EVALUATIONS = {"euler": 1, "leapfrog": 1, "chin4": 3}
+
+
+def constants(scene, dt: float, integrator: str, speed_limit: float) -> list[float]:
     """Values of ``CONSTANTS`` for a scene, in float64."""
     ground = scene.ground
+    span = dt / DRIFTS[integrator]
     return [
         dt,
-        math.exp(-0.5 * scene.damping * dt),
+        span,
+        math.exp(-0.5 * scene.damping * span),
         *scene.gravity,
         ground.stiffness if ground else 0.0,
         ground.static_friction if ground else 0.0,
@@ -113,11 +121,11 @@ auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n)
     ux = select(stuck, zero, ux); uy = select(stuck, zero, uy);
 };
 
-// Height z and vertical velocity u under gravity and the ground over one step, by `substeps`
+// Height z and vertical velocity u under gravity and the ground over one drift, by `substeps`
 // velocity-Verlet steps; returns the impulse of the ground per unit of mass.
 auto contact_flow = [=](real& z, real& u, real w, int substeps)
         __attribute__((always_inline)) -> real {
-    const scalar h = dt / scalar(substeps), half_h = h * scalar(0.5);
+    const scalar h = span / scalar(substeps), half_h = h * scalar(0.5);
     real push = ground_force(z) * w, impulse = zero;
     for (int s = 0; s < substeps; ++s) {
         u += (push + gravity_z) * half_h;
@@ -130,47 +138,76 @@ auto contact_flow = [=](real& z, real& u, real w, int substeps)
     return impulse * half_h;
 };
 
-// Leapfrog, kick - drift - kick. Two half kicks meet between steps, so the state kept is the
-// position at t_n and the velocity just before the kick of t_n; only the first kick is a half one.
-// Damping and drag act for half a step on either side of the kick (Strang splitting).
-auto leapfrog_kick = [=](Vec& v, Vec f, real w, real z, bool before, scalar kick, bool after)
-        __attribute__((always_inline)) {
-    if (before && DAMPING) { v.x *= decay_half; v.y *= decay_half; v.z *= decay_half; }
-    if (before && DRAG) drag_flow(v, w, dt * scalar(0.5));
-    real ax = f.x * w + gravity_x, ay = f.y * w + gravity_y, az = f.z * w;
-    if (GROUND) { if (COURSE) course_friction(ax, ay, v.x, v.y, ground_force(z) * w); }
-    else az += gravity_z;
-    v.x += ax * kick; v.y += ay * kick; v.z += az * kick;
-    if (after && DRAG) drag_flow(v, w, dt * scalar(0.5));
-    if (after && DAMPING) { v.x *= decay_half; v.y *= decay_half; v.z *= decay_half; }
+// Kicks and drifts. The springs kick; a drift of `span` seconds moves by the velocity, and gravity
+// and the ground's normal force belong to it. Damping and drag act for half a span on either side
+// of a kick (Strang splitting). The last kick of a step and the first of the next meet, so the
+// state kept is the position at t_n and the velocity just before both: the very first kick of a
+// simulation, and the one that synchronises a velocity that is looked at, are the last or first
+// part alone, with the damping of their own side only.
+//
+// leapfrog   kick dt, drift dt                                           second order
+// chin4      kick dt/3, drift dt/2, gradient kick 2 dt/3, drift dt/2     fourth order
+//
+// chin4 is algorithm 4A of S. A. Chin, Phys. Lett. A 226 (1997) 344. The gradient kick takes the
+// forces at x + a dt^2/24, a the acceleration that the kick would give at x.
+const scalar FIRST_KICK = CHIN4 ? dt / scalar(6) : dt * scalar(0.5);  // half of the joined kick
+const scalar GRADIENT_KICK = dt * scalar(2) / scalar(3);
+const scalar GRADIENT_SHIFT = dt * dt / scalar(24);
+
+auto kick_acceleration = [=](Vec f, real w) __attribute__((always_inline)) -> Vec {
+    return Vec{f.x * w + gravity_x, f.y * w + gravity_y,
+               GROUND ? f.z * w : f.z * w + gravity_z};
+};
+auto lose_before = [=](Vec& v, real w) __attribute__((always_inline)) {
+    if (DAMPING) { v.x *= decay; v.y *= decay; v.z *= decay; }
+    if (DRAG) drag_flow(v, w, span * scalar(0.5));
+};
+auto lose_after = [=](Vec& v, real w) __attribute__((always_inline)) {
+    if (DRAG) drag_flow(v, w, span * scalar(0.5));
+    if (DAMPING) { v.x *= decay; v.y *= decay; v.z *= decay; }
+};
+auto kick = [=](Vec& v, Vec f, real w, real z, scalar time) __attribute__((always_inline)) {
+    Vec a = kick_acceleration(f, w);
+    if (GROUND && COURSE) course_friction(a.x, a.y, v.x, v.y, ground_force(z) * w);
+    v.x += a.x * time; v.y += a.y * time; v.z += a.z * time;
 };
 
-// The drift moves by the velocity; gravity and the ground's normal force belong to it. A mass in
-// free flight follows its parabola; where the parabola's ends are not both above the ground, the
-// contact flow takes over, and friction acts once, with the impulse it added up.
-auto leapfrog_drift = [=](Vec& x, Vec& v, real w, int substeps) __attribute__((always_inline)) {
+// A mass in free flight follows its parabola; where the parabola's ends are not both above the
+// ground, the contact flow takes over. Friction acts once a drift, between the kick and the drift,
+// so that a mass that sticks does not move at all. The impulse it may use is the drift's own, in
+// proportion to the kick before it: the first drift of a chin4 step, after a third of the step's
+// kicks, leaves a third of its impulse to the second.
+auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool last)
+        __attribute__((always_inline)) {
     if (GROUND) {
-        real z = x.z + (v.z + gravity_z * dt * scalar(0.5)) * dt, u = v.z + gravity_z * dt;
+        real z = x.z + (v.z + gravity_z * span * scalar(0.5)) * span, u = v.z + gravity_z * span;
         mask touching = (x.z < zero) | (z < zero);
-        if (any(touching)) {
+        if (CHIN4 && last ? any(touching | (left_over > zero)) : any(touching)) {
             real z_contact = x.z, u_contact = v.z;
-            real j = contact_flow(z_contact, u_contact, w, substeps);
+            real impulse = contact_flow(z_contact, u_contact, w, substeps);
             z = select(touching, z_contact, z);
             u = select(touching, u_contact, u);
-            if (COULOMB) coulomb(v.x, v.y, select(touching, j, zero));
-        }
+            impulse = select(touching, impulse, zero);
+            if (CHIN4) {
+                real usable = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
+                left_over = impulse - usable;
+                impulse = usable;
+            }
+            if (COULOMB) coulomb(v.x, v.y, impulse);
+        } else if (CHIN4) left_over = zero;
         x.z = z; v.z = u;
     } else {
-        x.z += v.z * dt;
+        x.z += v.z * span;
     }
-    x.x += v.x * dt; x.y += v.y * dt;
+    x.x += v.x * span; x.y += v.y * span;
 };
 
-// The velocity at t_n, from the state before its kick: the missing half step, with the friction
-// of half a step, so that a mass that sticks is reported at rest.
-auto leapfrog_synchronise = [=](Vec& v, Vec f, real w, real z) __attribute__((always_inline)) {
-    leapfrog_kick(v, f, w, z, true, dt * scalar(0.5), false);
-    if (GROUND && COULOMB) coulomb(v.x, v.y, ground_force(z) * w * (dt * scalar(0.5)));
+// The velocity at t_n, from the state before its kicks: what the last part of them adds, with the
+// friction of as much time, so that a mass that sticks is reported at rest.
+auto synchronise = [=](Vec& v, Vec f, real w, real z) __attribute__((always_inline)) {
+    lose_before(v, w);
+    kick(v, f, w, z, FIRST_KICK);
+    if (GROUND && COULOMB) coulomb(v.x, v.y, ground_force(z) * w * FIRST_KICK);
 };
 
 // Symplectic Euler, the classroom's method: all forces at t_n, then velocity, then position.
@@ -186,8 +223,8 @@ auto euler_step = [=](Vec& x, Vec& v, Vec f, real w) __attribute__((always_inlin
         v.x += ax * dt; v.y += ay * dt; v.z += az * dt;
     }
     if (DAMPING) {
-        const scalar decay = decay_half * decay_half;
-        v.x *= decay; v.y *= decay; v.z *= decay;
+        const scalar whole = decay * decay;
+        v.x *= whole; v.y *= whole; v.z *= whole;
     }
     if (DRAG) drag_flow(v, w, dt);
     x.x += v.x * dt; x.y += v.y * dt; x.z += v.z * dt;
