@@ -17,8 +17,8 @@ XY = slice(0, 2)
 Z = 2
 
 
-def speeds(vectors):
-    """Euclidean length of each row, shape (M,)."""
+def norms(vectors):
+    """Euclidean length of each row, shape (n,)."""
     return np.sqrt((vectors * vectors).sum(axis=1))
 
 
@@ -29,16 +29,14 @@ def rest_lengths(robot, time):
 
 def spring_forces(robot, positions, time):
     """Force of all springs on each mass [N], shape (M, 3): k (L - L0) towards the other end."""
+    i, j = robot.springs.T
+    reach = positions[j] - positions[i]
+    length = norms(reach)
+    tension = robot.stiffness * (length - rest_lengths(robot, time))
+    direction = reach / np.where(length > 0.0, length, 1.0)[:, None]  # none, so no force
     forces = np.zeros_like(positions)
-    rest = rest_lengths(robot, time)
-    for spring, (i, j) in enumerate(robot.springs):
-        reach = positions[j] - positions[i]
-        length = np.sqrt(reach @ reach)
-        if length == 0.0:
-            continue  # no direction, so no force
-        pull = robot.stiffness[spring] * (length - rest[spring]) / length * reach
-        forces[i] += pull
-        forces[j] -= pull
+    np.add.at(forces, i, tension[:, None] * direction)
+    np.add.at(forces, j, -tension[:, None] * direction)
     return forces
 
 
@@ -58,7 +56,7 @@ class Energies:
 
 def energies(robot, scene, positions, velocities, time):
     """Energies [J] of a pose: textbook formulas, zero height at the origin."""
-    lengths = speeds(positions[robot.springs[:, 1]] - positions[robot.springs[:, 0]])
+    lengths = norms(positions[robot.springs[:, 1]] - positions[robot.springs[:, 0]])
     stretch = lengths - rest_lengths(robot, time)
     depth = np.minimum(positions[:, Z], 0.0)
     stiffness = scene.ground.stiffness if scene.ground is not None else 0.0
@@ -149,7 +147,7 @@ class Trial:
 
     def _dragged(self, velocities, duration):
         """The exact solution of dv/dt = -(c/m) |v| v over `duration`."""
-        rate = self.scene.drag * speeds(velocities) / self.masses
+        rate = self.scene.drag * norms(velocities) / self.masses
         return velocities / (1.0 + rate * duration)[:, None]
 
     def _note(self, value, threshold):
@@ -278,13 +276,13 @@ def continuum(robot, scene, duration, steps):
 
     def acceleration(x, v, t):
         reach = x[j] - x[i]
-        length = speeds(reach)
+        length = norms(reach)
         tension = robot.stiffness * (length - rest_lengths(robot, t)) / length
         forces = incidence @ (tension[:, None] * reach) + masses * np.asarray(scene.gravity)
         if scene.ground is not None:
             forces[:, Z] += scene.ground.stiffness * np.maximum(-x[:, Z], 0.0)
         if scene.drag:
-            forces -= scene.drag * speeds(v)[:, None] * v
+            forces -= scene.drag * norms(v)[:, None] * v
         return forces / masses - scene.damping * v
 
     x, v = robot.positions.copy(), robot.velocities.copy()

@@ -26,10 +26,12 @@ from warp_springs.packing import (
     coefficients,
     lane_major,
     longest_springs,
+    not_finite,
     sort_rows,
 )
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
+from warp_springs.stability import Status
 from warp_springs.variants import Variants
 
 __all__ = ["Batch", "Group", "Slots"]
@@ -48,6 +50,7 @@ PACKED = (
     "positions",
     "velocities",
     "oscillators",
+    "states",
 )
 
 
@@ -220,7 +223,9 @@ class Batch:
     def _pack(self, strip: Strip, width: int, actuated: bool) -> None:
         """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
         n, fields = len(strip.ids), strip.fields
-        lightest = np.minimum.reduceat(fields["masses"], np.cumsum(strip.masses) - strip.masses)
+        first_mass = np.cumsum(strip.masses) - strip.masses
+        lightest = np.minimum.reduceat(fields["masses"], first_mass)
+        heaviest = np.maximum.reduceat(fields["masses"], first_mass)
         self.substeps[strip.ids] = self._contact_substeps(lightest)
         within = np.arange(n)
         self._slot[strip.ids, 0] = len(self) + within // width
@@ -233,20 +238,26 @@ class Batch:
         reach = np.where(longest > 0.0, self._stretch * longest, np.inf)
         turn = fields["omega"] * self._span
         start = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
-        per_robot = {
-            "inverse_masses": 1.0 / fields["masses"],
-            "coefficients": coefficients(fields, order, actuated),
-            "omegas": fields["omega"],
-            "reaches2": reach**2,
-            "positions": fields["positions"],
-            "velocities": fields["velocities"],
-            "oscillators": start,
+        one = np.ones(n, np.int64)
+        per_robot = {  # values, and how many rows of them each robot has
+            "inverse_masses": (1.0 / fields["masses"], strip.masses),
+            "coefficients": (coefficients(fields, order, actuated), strip.counts),
+            "omegas": (fields["omega"], one),
+            "positions": (fields["positions"], strip.masses),
+            "velocities": (fields["velocities"], strip.masses),
+            "oscillators": (start, one),
         }
+        # A robot whose numbers do not exist in this precision is never stepped; a mass that is too
+        # large for it would come out as one without an inverse.
+        invalid = heaviest > np.finfo(self._precision).max
         self._append("rows", row)
         self._append("partners", partner)
-        for name, values in per_robot.items():
-            flat = lane_major(values, n, width) if strip.shared else values.ravel()
-            self._append(name, flat.astype(dtype_of(name, self._precision), copy=False))
+        for name, (values, rows) in per_robot.items():
+            cast = values.astype(dtype_of(name, self._precision), copy=False)
+            invalid |= not_finite(cast, rows)
+            self._append(name, lane_major(cast, n, width) if strip.shared else cast.ravel())
+        for name, values in {"reaches2": reach**2, "states": invalid * Status.INVALID}.items():
+            self._append(name, lane_major(values.astype(dtype_of(name, self._precision)), n, width))
 
     def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
         """The rows of the table of bundles for a strip."""

@@ -9,7 +9,15 @@ import numpy as np
 
 from warp_springs.robot import Robot
 
-__all__ = ["Strip", "aligned", "coefficients", "lane_major", "longest_springs", "sort_rows"]
+__all__ = [
+    "Strip",
+    "aligned",
+    "coefficients",
+    "lane_major",
+    "longest_springs",
+    "not_finite",
+    "sort_rows",
+]
 
 MASS_FIELDS = ("masses", "positions", "velocities")
 SPRING_FIELDS = ("stiffness", "rest_length", "amplitude", "phase")
@@ -128,16 +136,26 @@ def _largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return largest
 
 
+def not_finite(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Robots with an infinity or a NaN in their ``counts`` rows of ``values``, shape (n,) bool."""
+    good = np.isfinite(values)
+    if good.all():
+        return np.zeros(len(counts), bool)
+    rows = ~good.reshape(len(values), -1).all(axis=1)
+    return _largest(rows.astype(float), counts) > 0.0
+
+
 def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:
     """Flat values of ``robots`` equal robots with the lane as the innermost index.
 
     The last robot fills the lanes that are left over in the last bundle.
     """
-    block = values.reshape(robots, -1)
     if width == 1:
-        return block.ravel()
-    lanes = np.minimum(np.arange(-(-robots // width) * width), robots - 1)
-    return block[lanes].reshape(-1, width, block.shape[1]).transpose(0, 2, 1).ravel()
+        return values.ravel()
+    bundles, size = -(-robots // width), values.size // robots
+    lanes = np.minimum(np.arange(bundles * width), robots - 1)
+    block = values.reshape(robots, size)[lanes].reshape(bundles, width, size)
+    return block.transpose(0, 2, 1).ravel()
 
 
 def aligned(parts: Sequence[np.ndarray], dtype: np.dtype) -> np.ndarray:

@@ -159,7 +159,7 @@ class Simulation:
         lanes = len(buffers["omegas"])
         buffers["seen_centers"] = aligned([np.zeros(3 * lanes, real)], real)
         buffers["seen_energies"] = aligned([np.zeros(4 * lanes, real)], real)
-        for name in ("states", "state_steps", "seen_states", "seen_state_steps"):
+        for name in ("state_steps", "seen_states", "seen_state_steps"):
             buffers[name] = np.zeros(lanes, np.int32)
         return buffers
 

@@ -24,6 +24,8 @@ class Status(enum.IntEnum):
     OVERSTRETCHED = 2
     #: A mass is faster than ``Limits.speed``.
     TOO_FAST = 3
+    #: A number of the robot does not exist in the precision of the run; it was never stepped.
+    INVALID = 4
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warp_springs.robot import FIELDS, Robot, checked, freeze
+from warp_springs.fields import FIELDS, checked, freeze
+from warp_springs.robot import Robot
 
 STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule != "index")
 """The fields in which variants of one body may differ: all but its springs and faces."""

@@ -90,7 +90,7 @@ def compare(batch, scene, integrator, precision="float64"):
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
-@settings(max_examples=8)
+@settings(max_examples=7)
 @given(single=robots(), shared=robots())
 def test_random_robots_follow_the_reference(scene, integrator, single, shared):
     # Robots of one topology are stepped together, in lanes; a robot that is the only one is not.

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warp_springs.robot import FIELDS, Robot
+from warp_springs.fields import FIELDS
+from warp_springs.robot import Robot
 from warp_springs.shapes import cube, lattice, octahedron, tetrahedron, voxels
 
 TRIANGLE = {
@@ -489,6 +490,22 @@ def test_both_windings_cancel_and_equal_faces_stay_once():
     assert len(front.joined(back, merge=True).faces) == 0
     assert len(front.joined(back, merge=False).faces) == 2
     assert front.joined(triangle(faces=[[1, 2, 0]]), merge=True).faces.tolist() == [[0, 1, 2]]
+
+
+def test_of_duplicates_inside_one_body_only_springs_are_merged():
+    doubled = Robot(
+        masses=1.0,
+        positions=[[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]],
+        springs=[[0, 2], [2, 0], [1, 2]],
+        stiffness=[1.0, 2.0, 3.0],
+        faces=[[0, 2, 3], [2, 3, 0]],
+    )
+    apart = doubled.joined(doubled.moved((5, 0, 0)), merge=True)
+    assert (apart.n_masses, len(apart.faces)) == (8, 4)
+    assert apart.springs.tolist() == [[0, 2], [1, 2], [4, 6], [5, 6]]
+    assert apart.stiffness.tolist() == [1.0, 3.0, 1.0, 3.0]
+    # One mass of the first takes in both of the second's that coincide with it.
+    assert triangle().joined(doubled, merge=True, tolerance=0.0).n_masses == 5
 
 
 def test_joined_robots_share_one_omega():

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from warp_springs.robot import FIELDS, Robot
+from warp_springs.fields import FIELDS
+from warp_springs.robot import Robot
 from warp_springs.shapes import lattice
 from warp_springs.variants import STACKABLE, Variants
 

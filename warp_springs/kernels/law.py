@@ -85,10 +85,12 @@ auto breathing = [=](real qa, real qs, real qc, real sine, real cosine)
     return qa + (qs * sine + qc * cosine);
 };
 
-// Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m).
+// Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
+// square overflows must not come out as rest: it turns into NaN, which the health check sees.
 auto drag_flow = [=](Vec& v, real w, scalar h) __attribute__((always_inline)) {
-    real speed = square_root(v.x * v.x + v.y * v.y + v.z * v.z);
-    real factor = real(scalar(1) + zero) / (speed * w * (drag * h) + scalar(1));
+    real speed2 = v.x * v.x + v.y * v.y + v.z * v.z;
+    real slowing = square_root(speed2) * w * (drag * h) + scalar(1);
+    real factor = (zero + scalar(1)) / slowing + speed2 * scalar(0);
     v.x *= factor; v.y *= factor; v.z *= factor;
 };
 
@@ -103,7 +105,7 @@ auto coulomb = [=](real& ux, real& uy, real j) __attribute__((always_inline)) {
     real speed = square_root(ux * ux + uy * uy);
     real left = scalar(1) - kinetic_friction * j / select(speed > zero, speed, zero + scalar(1));
     left = select(left > zero, left, zero);
-    real factor = select(speed <= static_friction * j, zero, left);
+    real factor = select((j > zero) & (speed <= static_friction * j), zero, left);
     ux *= factor; uy *= factor;
 };
 

@@ -57,7 +57,7 @@ def flatten(lens: Lens, p: wp.vec3):
 
 
 @wp.func
-def shadow_of_sphere(lens: Lens, c: float, z: float, radius: float):
+def extent_of_sphere(lens: Lens, c: float, z: float, radius: float):
     """Lowest and highest image coordinate of a sphere along one axis (tangents to a circle)."""
     if lens.perspective == 1:
         across = z * z - radius * radius
@@ -68,9 +68,9 @@ def shadow_of_sphere(lens: Lens, c: float, z: float, radius: float):
 
 @wp.func
 def rows_between(lens: Lens, low: float, high: float):
-    """First and last row of the band, relative to it, whose samples may lie in low ... high."""
-    first = wp.max(int(wp.floor(row(lens, low))) - lens.first_row, 0)
-    last = wp.min(int(wp.floor(row(lens, high))) - lens.first_row, lens.rows - 1)
+    """First and last row, counted in the band, with samples between two heights [pixels]."""
+    first = wp.max(int(wp.floor(low)) - lens.first_row, 0)
+    last = wp.min(int(wp.floor(high)) - lens.first_row, lens.rows - 1)
     return wp.vec2i(first, last)
 
 
@@ -127,8 +127,8 @@ def draw_spheres(
     quadratic = k * (r2 - c[1] * c[1]) - m
 
     n = offsets.shape[0]
-    span = shadow_of_sphere(lens, c[1], c[2], radius)
-    between = rows_between(lens, span[0], span[1])
+    span = extent_of_sphere(lens, c[1], c[2], radius)
+    between = rows_between(lens, row(lens, span[0]), row(lens, span[1]))
     for y in range(between[0] + part, between[1] + 1, lens.parts):
         for s in range(n):
             top = (float(lens.first_row + y) + offsets[s][1] - lens.center_y) / lens.focal
@@ -185,13 +185,15 @@ def draw_cylinders(
     behind = w[2] * a[2] + k * (w[0] * a[0] + w[1] * a[1])
     quadratic = r2 * k * (1.0 - w[0] * w[0]) - moment[0] * moment[0]
 
-    xa = shadow_of_sphere(lens, a[0], a[2], radius)
-    xb = shadow_of_sphere(lens, b[0], b[2], radius)
-    ya = shadow_of_sphere(lens, a[1], a[2], radius)
-    yb = shadow_of_sphere(lens, b[1], b[2], radius)
+    xa = extent_of_sphere(lens, a[0], a[2], radius)
+    xb = extent_of_sphere(lens, b[0], b[2], radius)
+    ya = extent_of_sphere(lens, a[1], a[2], radius)
+    yb = extent_of_sphere(lens, b[1], b[2], radius)
     left_end = column(lens, wp.min(xa[0], xb[0]))
     right_end = column(lens, wp.max(xa[1], xb[1]))
-    between = rows_between(lens, wp.min(ya[0], yb[0]), wp.max(ya[1], yb[1]))
+    upper = row(lens, wp.min(ya[0], yb[0]))
+    lower = row(lens, wp.max(ya[1], yb[1]))
+    between = rows_between(lens, upper, lower)
 
     n = offsets.shape[0]
     for y in range(between[0] + part, between[1] + 1, lens.parts):
@@ -281,10 +283,9 @@ def draw_triangles(
     right_end = wp.max(a[0], wp.max(b[0], c[0]))
     upper = wp.min(a[1], wp.min(b[1], c[1]))
     lower = wp.max(a[1], wp.max(b[1], c[1]))
-    first = wp.max(int(wp.floor(upper)) - lens.first_row, 0)
-    last = wp.min(int(wp.floor(lower)) - lens.first_row, lens.rows - 1)
+    between = rows_between(lens, upper, lower)
     n = offsets.shape[0]
-    for y in range(first + part, last + 1, lens.parts):
+    for y in range(between[0] + part, between[1] + 1, lens.parts):
         for s in range(n):
             top = float(lens.first_row + y) + offsets[s][1]
             if top >= upper and top <= lower:

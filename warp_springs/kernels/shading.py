@@ -14,9 +14,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 0})
 
 SAMPLES = wp.constant(4)
 """Samples in a pixel of a picture."""
-REACH = wp.constant(14)
-"""Half the edge of the largest square over which a shadow's edge is blurred [texels]."""
-COLUMNS_A_THREAD = wp.constant(128)
+COLUMNS_A_THREAD = wp.constant(16)
 """Columns of the table of sums that one thread adds up: two lines of the cache."""
 
 _LONGEST_WAY = wp.constant(2000.0)  # in texels: the sum over 1024 x 1024 stays below 2^31
@@ -37,6 +35,7 @@ class Sun:
     center: float  # texel at the sun's X = Y = 0
     size: int  # texels along the edge of the map
     spread: float  # half the blur's width per length from the hiding to the hidden point
+    reach: int  # half the blur's greatest width; the map's rim, left empty, is wider [texels]
     floor: wp.vec3  # depth of the floor [m]: [0] + [1] column + [2] row
 
 
@@ -63,10 +62,12 @@ class Surfaces:
     """Everything drawn: surfaces are numbered triangles first, then cylinders, then spheres."""
 
     points: wp.array(dtype=wp.vec3)
-    corners: wp.array(dtype=wp.vec3i)
-    ends: wp.array(dtype=wp.vec2i)
-    centers: wp.array(dtype=int)
-    colors: wp.array(dtype=wp.vec3)  # of each surface
+    corners: wp.array(dtype=wp.vec3i)  # of triangles, as indices of points
+    ends: wp.array(dtype=wp.vec2i)  # of cylinders
+    end_radii: wp.array(dtype=float)
+    centers: wp.array(dtype=int)  # of spheres
+    center_radii: wp.array(dtype=float)
+    colors: wp.array(dtype=wp.vec3)  # of every surface
 
 
 @wp.func
@@ -130,20 +131,19 @@ def shadow_on_floor(sun: Sun, sums: wp.array2d(dtype=wp.vec2i), p: wp.vec3):
     q = sun.turn * p + sun.shift
     x = sun.center + q[0] * sun.scale
     y = sun.center + q[1] * sun.scale
-    first = float(REACH + 1)
+    first = float(sun.reach + 1)
     last = float(sun.size) - first
     if x < first or y < first or x >= last or y >= last:
         return 0.0
-    x0 = int(x) - REACH
-    y0 = int(y) - REACH
-    x1 = int(x) + REACH + 1
-    y1 = int(y) + REACH + 1
-    near = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+    x0 = int(x) - sun.reach
+    y0 = int(y) - sun.reach
+    edge = 2 * sun.reach + 1
+    near = sums[y0 + edge, x0 + edge] - sums[y0, x0 + edge] - sums[y0 + edge, x0] + sums[y0, x0]
     if near[0] == 0:
         return 0.0
-    if near[0] == (2 * REACH + 1) * (2 * REACH + 1):
+    if near[0] == edge * edge:
         return 1.0
-    blur = wp.clamp(float(near[1]) / float(near[0]) * sun.spread, 0.75, float(REACH))
+    blur = wp.clamp(float(near[1]) / float(near[0]) * sun.spread, 0.75, float(sun.reach))
     base = sums[int(y), int(x)][0]
     hidden = covered_before(sums, base, x + blur, y + blur)
     hidden -= covered_before(sums, base, x - blur, y + blur)

@@ -97,7 +97,7 @@ def drawn_radii(rest_length: ArrayLike) -> tuple[float, float]:
 
 
 def grid_offsets(
-    extents: ArrayLike, columns: int | None = None, spacing: float = 1.35
+    extents: ArrayLike, columns: int | None = None, spacing: float = 1.5
 ) -> NDArray[np.float64]:
     """Return how far to move each robot so that all stand on a square grid around the origin.
 

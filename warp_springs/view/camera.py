@@ -78,20 +78,22 @@ class Camera:
         points: ArrayLike,
         size: tuple[int, int],
         *,
+        radius: ArrayLike = 0.0,
         azimuth: float = -58.0,
         elevation: float = 27.0,
         field_of_view: float = 32.0,
         margin: float = 1.25,
     ) -> Camera:
-        """Return the camera that stands as near as it can with all points in the picture.
+        """Return the camera that stands as near as it can with all spheres in the picture.
 
         Args:
-            points: World points (P, 3) in m.
+            points: Centres of the spheres, world points (P, 3) in m.
             size: Width and height of the picture in pixels.
+            radius: Their radii, (P,) or one number, m; below 1 mm counts as 1 mm.
             azimuth: Where it stands around the vertical, degrees from +x towards +y.
             elevation: How high it stands above the horizon, degrees.
             field_of_view: As in `Camera`.
-            margin: Size of the picture in units of what the points fill of it.
+            margin: Size of the picture in units of the part that the spheres may fill.
         """
         points = np.asarray(points, dtype=np.float64)
         around, above = np.radians(azimuth), np.radians(elevation)
@@ -102,9 +104,11 @@ class Camera:
         seen = points @ axes.T
         half = np.tan(np.radians(field_of_view) / 2) / margin
         slopes = np.array([half * size[0] / size[1], half])
-        # a point fits if |x - x_eye| <= slope (z - z_eye); so does the worst point of either side
-        right = (seen[:, :2] - slopes * seen[:, 2:]).max(axis=0)
-        left = (-seen[:, :2] - slopes * seen[:, 2:]).max(axis=0)
+        # a sphere fits if |x - x_eye| + r sqrt(1 + slope^2) <= slope (z - z_eye), likewise for y
+        radius = np.maximum(np.broadcast_to(radius, len(points)), 1e-3)[:, None]
+        reach = radius * np.sqrt(1 + slopes**2) - slopes * seen[:, 2:]
+        right = (seen[:, :2] + reach).max(axis=0)
+        left = (-seen[:, :2] + reach).max(axis=0)
         eye_z = -float(((right + left) / (2 * slopes)).max())
         eye = np.append((right - left) / 2, eye_z)
         middle = float(seen[:, 2].mean())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import os
 import uuid
 from collections.abc import Sequence
@@ -24,6 +25,8 @@ COLORS = ("stress", "plain")
 
 _FRAMES_FOR_SCALE = 64
 _TILE_PER_SIZE = 0.45
+_VIEW_OF_ONE = {"azimuth": -58.0, "elevation": 25.0, "margin": 1.6}
+_VIEW_OF_MANY = {"azimuth": -64.0, "elevation": 28.0, "margin": 1.2}
 _LABEL_INK = (28, 32, 38)
 _LABEL_HALO = (232, 237, 242)
 
@@ -118,6 +121,7 @@ def picture(
     """Return the picture that `render` writes, (H, W, 3) uint8 sRGB; arguments as there."""
     if color not in COLORS:
         raise ValueError(f"color must be one of {', '.join(map(repr, COLORS))}, got {color!r}")
+    rasteriser = Rasteriser(size, device)
     robots = _checked_robots(result, robots, frame)
     if labels is not None and (isinstance(labels, str) or len(labels) != len(robots)):
         raise ValueError(f"labels must be {len(robots)} texts, one for each robot, got {labels!r}")
@@ -126,8 +130,9 @@ def picture(
         poses = side_by_side(poses)
     drawing = arrange(poses, skin=skin, floor=result.scene.ground is not None)
     if camera is None:
-        camera = Camera.framing(drawing.points, size)
-    pixels = Rasteriser(size, device).draw(drawing, camera)
+        view = _VIEW_OF_ONE if len(poses) == 1 else _VIEW_OF_MANY
+        camera = Camera.framing(drawing.points, rasteriser.size, radius=drawing.ball_radius, **view)
+    pixels = rasteriser.draw(drawing, camera)
     if labels is None:
         return pixels
     return with_labels(pixels, poses, labels, camera)
@@ -144,12 +149,15 @@ def pose(result: Result, robot: int, frame: int | None = -1, color: str = "stres
 
     Raises:
         ValueError: If the robot was not recorded or the frame is out of range.
+        TypeError: If the frame is not a whole number or None.
     """
     body = result.robots[robot]
     if frame is None:
         positions, time = result.positions(robot), result.end_time
     else:
         frames = result.frames(robot)
+        if not isinstance(frame, numbers.Integral):
+            raise TypeError(f"frame must be a whole number or None, got {frame!r}")
         if not -len(frames) <= frame < len(frames):
             raise ValueError(
                 f"frame {frame} is out of range: {len(frames)} frames were recorded, "
@@ -210,11 +218,13 @@ def with_labels(
     pixels: NDArray[np.uint8], poses: Sequence[Pose], labels: Sequence[str], camera: Camera
 ) -> NDArray[np.uint8]:
     """Return a picture, (H, W, 3) uint8, with a text below each robot."""
+    import matplotlib
     from PIL import Image, ImageDraw, ImageFont
 
     image = Image.fromarray(pixels)
     draw = ImageDraw.Draw(image)
-    font = ImageFont.load_default(size=max(10.0, image.height / 40))
+    file = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
+    font = ImageFont.truetype(str(file), max(10, image.height // 40))
     for p, label in zip(poses, labels, strict=True):
         seen = camera.project(p.positions, image.size)
         seen = seen[seen[:, 2] > 0]
@@ -301,5 +311,8 @@ def _save(pixels: NDArray[np.uint8], path: Path) -> None:
     try:
         Image.fromarray(pixels).save(beside, format="PNG", compress_level=6)
         beside.replace(path)
+    except OSError as error:
+        reason = f"cannot write a picture to {str(path)!r}: {error.strerror}"
+        raise OSError(error.errno, reason) from error
     finally:
         beside.unlink(missing_ok=True)

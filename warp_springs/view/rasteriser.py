@@ -9,12 +9,13 @@ from __future__ import annotations
 import functools
 import math
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warp_springs.kernels import raster, shading
 from warp_springs.view import appearance
@@ -23,12 +24,19 @@ from warp_springs.view.camera import Camera, view_axes
 TO_SUN = (-0.42, -0.62, 1.15)
 """Direction from the floor to the sun, world axes, any length."""
 
-# places of the samples in a pixel: each row and column of a 4 x 4 grid holds one sample
+# places of the shading.SAMPLES samples in a pixel: one in each row and column of a 4 x 4 grid
 _SAMPLES = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
 _BAND_ROWS = 90
+_CUDA_BAND_ROWS = 2160
 _CUDA_PARTS = 16
 _MAP_SIZE = 1024
 _SUN_SPREAD = 0.07
+_LONGEST_REACH = 40
+
+
+def _none(*row: int) -> Callable[[], NDArray[np.float64]]:
+    """Return a maker of an array without rows."""
+    return functools.partial(np.zeros, (0, *row))
 
 
 @dataclass(frozen=True)
@@ -50,14 +58,14 @@ class Drawing:
     """
 
     points: NDArray[np.float64]
-    triangles: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 3), np.int32))
-    triangle_color: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3)))
-    bars: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), np.int32))
-    bar_radius: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    bar_color: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3)))
-    balls: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, np.int32))
-    ball_radius: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    ball_color: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3)))
+    triangles: NDArray[np.integer] = field(default_factory=_none(3))
+    triangle_color: NDArray[np.floating] = field(default_factory=_none(3))
+    bars: NDArray[np.integer] = field(default_factory=_none(2))
+    bar_radius: NDArray[np.floating] = field(default_factory=_none())
+    bar_color: NDArray[np.floating] = field(default_factory=_none(3))
+    balls: NDArray[np.integer] = field(default_factory=_none())
+    ball_radius: NDArray[np.floating] = field(default_factory=_none())
+    ball_color: NDArray[np.floating] = field(default_factory=_none(3))
     floor: float | None = 0.0
     tile: float = 0.1
 
@@ -81,16 +89,18 @@ class Rasteriser:
         """
         self.size = _checked_size(size)
         self.device = wp.get_device(device)
+        self._launch = functools.partial(wp.launch, device=self.device)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, got {threads}")
         width, height = self.size
         on_cpu = self.device.is_cpu
-        self._threads = (threads or _usable_cores()) if on_cpu else 1
         self._parts = 1 if on_cpu else _CUDA_PARTS
         self._stride = 1 if on_cpu else width
-        self._band_rows = min(_BAND_ROWS, height) if on_cpu else height
-        self._samples = self._vectors(_SAMPLES)
-        self._centre_of_pixel = self._vectors(((0.5, 0.5),))
+        self._band_rows = min(_BAND_ROWS if on_cpu else _CUDA_BAND_ROWS, height)
+        bands = -(-height // self._band_rows)
+        self._threads = min(threads or _usable_cores(), bands) if on_cpu else 1
+        self._samples = self._array(_SAMPLES, wp.vec2)
+        self._middle = self._array(((0.5, 0.5),), wp.vec2)
         self._encode = wp.array(_screen_values(), dtype=wp.uint8, device=self.device)
         self._picture = wp.zeros((height, width, 3), dtype=wp.uint8, device=self.device)
         keys = width * self._band_rows * len(_SAMPLES)
@@ -102,24 +112,16 @@ class Rasteriser:
     def draw(self, drawing: Drawing, camera: Camera) -> NDArray[np.uint8]:
         """Return the picture, (H, W, 3) uint8 sRGB; the same input gives the same bits.
 
-        Shapes that reach behind the camera are left out.
+        The drawing needs a point at least. Shapes that reach behind the camera are left out.
         """
-        sun, sun_lens, sun_points = self._sunlight(drawing, camera)
-        shapes = self._shapes(drawing)
-        self._map.fill_(raster.EMPTY)
-        self._draw_shapes(sun_lens, self._centre_of_pixel, sun_points, shapes, self._map)
-        launch = functools.partial(wp.launch, device=self.device)
-        launch(shading.sum_rows, _MAP_SIZE, inputs=[sun, self._map], outputs=[self._sums])
-        groups = -(-_MAP_SIZE // int(shading.COLUMNS_A_THREAD))
-        launch(shading.sum_columns, groups, inputs=[], outputs=[self._sums])
-        points = self._vectors(camera.view(drawing.points))
-        surfaces = _surfaces(points, shapes)
+        surfaces = self._surfaces(drawing, camera)
+        sun = self._sunlight(drawing, camera, surfaces)
         floor = _floor(drawing, camera)
         starts = range(0, self.size[1], self._band_rows)
 
         def draw_bands(thread: int) -> None:
             for start in starts[thread :: self._threads]:
-                self._draw_band(start, camera, sun, floor, surfaces, shapes, self._keys[thread])
+                self._draw_band(start, camera, sun, floor, surfaces, self._keys[thread])
 
         if self._threads == 1:
             draw_bands(0)
@@ -128,7 +130,15 @@ class Rasteriser:
                 list(pool.map(draw_bands, range(self._threads)))
         return self._picture.numpy().copy()
 
-    def _draw_band(self, start, camera, sun, floor, surfaces, shapes, keys) -> None:
+    def _draw_band(
+        self,
+        start: int,
+        camera: Camera,
+        sun: shading.Sun,
+        floor: shading.Floor,
+        surfaces: shading.Surfaces,
+        keys: wp.array,
+    ) -> None:
         """Draw the rows of the picture from `start` on."""
         width, height = self.size
         lens = raster.Lens()
@@ -141,77 +151,71 @@ class Rasteriser:
         lens.first_row = start
         lens.rows = min(self._band_rows, height - start)
         lens.parts = self._parts
-        keys.fill_(raster.EMPTY)
-        self._draw_shapes(lens, self._samples, surfaces.points, shapes, keys)
-        wp.launch(
+        self._draw_surfaces(lens, self._samples, surfaces.points, surfaces, keys)
+        inputs = [lens, self._samples, sun, floor, surfaces, self._map, self._sums, keys]
+        self._launch(
             shading.shade,
-            dim=(lens.rows, self._stride),
-            inputs=[
-                lens,
-                self._samples,
-                sun,
-                floor,
-                surfaces,
-                self._map,
-                self._sums,
-                keys,
-                self._encode,
-                self._stride,
-            ],
+            (lens.rows, self._stride),
+            inputs=[*inputs, self._encode, self._stride],
             outputs=[self._picture],
-            device=self.device,
         )
 
-    def _draw_shapes(self, lens, samples, points, shapes, keys) -> None:
-        """Put the nearest surface of every sample into the keys."""
-        n_triangles, n_bars = len(shapes["triangles"]), len(shapes["bars"])
-        launch = functools.partial(wp.launch, outputs=[keys], device=self.device)
-        launch(
+    def _draw_surfaces(
+        self,
+        lens: raster.Lens,
+        samples: wp.array,
+        points: wp.array,
+        surfaces: shading.Surfaces,
+        keys: wp.array,
+    ) -> None:
+        """Put the nearest surface of every sample into the keys; the points are the lens's own."""
+        keys.fill_(raster.EMPTY)
+        n_triangles, n_bars = len(surfaces.corners), len(surfaces.ends)
+        view = [lens, samples, points]
+        self._launch(
             raster.draw_triangles,
             (n_triangles, lens.parts),
-            inputs=[lens, samples, points, shapes["triangles"], 0],
+            inputs=[*view, surfaces.corners, 0],
+            outputs=[keys],
         )
-        launch(
+        self._launch(
             raster.draw_spheres,
-            (len(shapes["balls"]), lens.parts),
-            inputs=[
-                lens,
-                samples,
-                points,
-                shapes["balls"],
-                shapes["ball_radius"],
-                n_triangles + n_bars,
-            ],
+            (len(surfaces.centers), lens.parts),
+            inputs=[*view, surfaces.centers, surfaces.center_radii, n_triangles + n_bars],
+            outputs=[keys],
         )
-        launch(
+        self._launch(
             raster.draw_cylinders,
             (n_bars, lens.parts),
-            inputs=[lens, samples, points, shapes["bars"], shapes["bar_radius"], n_triangles],
+            inputs=[*view, surfaces.ends, surfaces.end_radii, n_triangles],
+            outputs=[keys],
         )
 
-    def _shapes(self, drawing: Drawing) -> dict[str, wp.array]:
-        """Return the shapes as arrays on the device."""
+    def _surfaces(self, drawing: Drawing, camera: Camera) -> shading.Surfaces:
+        """Return the shapes on the device, their points in view coordinates."""
         colors = (drawing.triangle_color, drawing.bar_color, drawing.ball_color)
-        array = functools.partial(wp.array, device=self.device)
-        return {
-            "triangles": array(drawing.triangles.astype(np.int32), dtype=wp.vec3i),
-            "bars": array(drawing.bars.astype(np.int32), dtype=wp.vec2i),
-            "bar_radius": array(drawing.bar_radius.astype(np.float32), dtype=float),
-            "balls": array(drawing.balls.astype(np.int32), dtype=int),
-            "ball_radius": array(drawing.ball_radius.astype(np.float32), dtype=float),
-            "colors": array(np.concatenate(colors).astype(np.float32), dtype=wp.vec3),
-        }
+        surfaces = shading.Surfaces()
+        surfaces.points = self._array(camera.view(drawing.points), wp.vec3)
+        surfaces.corners = self._array(drawing.triangles, wp.vec3i)
+        surfaces.ends = self._array(drawing.bars, wp.vec2i)
+        surfaces.end_radii = self._array(drawing.bar_radius, float)
+        surfaces.centers = self._array(drawing.balls, int)
+        surfaces.center_radii = self._array(drawing.ball_radius, float)
+        surfaces.colors = self._array(np.concatenate(colors), wp.vec3)
+        return surfaces
 
-    def _sunlight(self, drawing: Drawing, camera: Camera):
-        """Return the sun, the lens of its map, and the points as the sun sees them."""
+    def _sunlight(
+        self, drawing: Drawing, camera: Camera, surfaces: shading.Surfaces
+    ) -> shading.Sun:
+        """Draw the sun's map and its table of sums, and return the light that reads them."""
         axes = view_axes(np.negative(TO_SUN))
         seen = drawing.points @ axes.T
-        reach = max(float(np.max(drawing.ball_radius, initial=1e-3)), 1e-3)
-        low, high = seen.min(axis=0) - reach, seen.max(axis=0) + reach
+        thickest = max(1e-3, *drawing.bar_radius, *drawing.ball_radius)
+        low, high = seen.min(axis=0) - thickest, seen.max(axis=0) + thickest
         # steps of scale and whole texels keep the shadow's edges still from frame to frame
         edge = 2.0 ** (math.ceil(4 * math.log2(1.02 * float((high - low)[:2].max()))) / 4)
-        texel = edge / (_MAP_SIZE - 4)
-        origin = np.append(np.rint((low + high)[:2] / 2 / texel) * texel, low[2] - reach)
+        texel = edge / (_MAP_SIZE - 2 * _LONGEST_REACH - 4)
+        origin = np.append(np.rint((low + high)[:2] / 2 / texel) * texel, low[2] - thickest)
 
         lens = raster.Lens()
         lens.perspective = 0
@@ -230,18 +234,26 @@ class Rasteriser:
         sun.scale = 1 / texel
         sun.center = _MAP_SIZE / 2
         sun.size = _MAP_SIZE
-        sun.spread = _SUN_SPREAD
         # the height of a point X, Y, Z of the sun's view above the floor is rise . (X, Y, Z) + foot
-        rise, foot = axes[:, 2], axes[:, 2] @ origin - (drawing.floor or 0.0)
+        height = drawing.floor or 0.0
+        rise, foot = axes[:, 2], axes[:, 2] @ origin - height
         slope = -rise[:2] / rise[2] * texel
         sun.floor = wp.vec3(-foot / rise[2] - slope.sum() * _MAP_SIZE / 2, *slope)
-        return sun, lens, self._vectors(seen - origin)
+        longest_way = (drawing.points[:, 2].max() + thickest - height) / -rise[2]
+        sun.spread = _SUN_SPREAD
+        sun.reach = int(np.clip(_SUN_SPREAD * longest_way / texel, 2, _LONGEST_REACH))
 
-    def _vectors(self, values) -> wp.array:
-        """Return (..., 2 or 3) values as an array of vectors on the device."""
-        values = np.ascontiguousarray(values, dtype=np.float32)
-        dtype = wp.vec2 if values.shape[-1] == 2 else wp.vec3
-        return wp.array(values, dtype=dtype, device=self.device)
+        points = self._array(seen - origin, wp.vec3)
+        self._draw_surfaces(lens, self._middle, points, surfaces, self._map)
+        self._launch(shading.sum_rows, _MAP_SIZE, inputs=[sun, self._map], outputs=[self._sums])
+        threads = -(-_MAP_SIZE // int(shading.COLUMNS_A_THREAD))
+        self._launch(shading.sum_columns, threads, inputs=[], outputs=[self._sums])
+        return sun
+
+    def _array(self, values: ArrayLike, dtype: type) -> wp.array:
+        """Return values as an array on the device, single precision or int32."""
+        scalar = np.int32 if dtype in (int, wp.vec2i, wp.vec3i) else np.float32
+        return wp.array(np.ascontiguousarray(values, scalar), dtype=dtype, device=self.device)
 
     def _empty_keys(self, n: int) -> wp.array:
         return wp.empty(n, dtype=wp.uint64, device=self.device)
@@ -254,16 +266,6 @@ def draw(
     return Rasteriser(size, device).draw(drawing, camera)
 
 
-def _surfaces(points: wp.array, shapes: dict[str, wp.array]) -> shading.Surfaces:
-    surfaces = shading.Surfaces()
-    surfaces.points = points
-    surfaces.corners = shapes["triangles"]
-    surfaces.ends = shapes["bars"]
-    surfaces.centers = shapes["balls"]
-    surfaces.colors = shapes["colors"]
-    return surfaces
-
-
 def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:
     """Return the floor as the camera sees it; fading scales with the camera's distance."""
     floor = shading.Floor()
@@ -272,8 +274,8 @@ def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:
     floor.axis_x = wp.vec3(*(camera.axes[:, 0] / drawing.tile))
     floor.axis_y = wp.vec3(*(camera.axes[:, 1] / drawing.tile))
     floor.eye_x, floor.eye_y = (np.mod(np.array(camera.eye[:2]) / drawing.tile, 2.0)).tolist()
-    floor.fade_from = 1.1 * camera.distance
-    floor.fade_over = 1.6 * camera.distance
+    floor.fade_from = 0.9 * camera.distance
+    floor.fade_over = 1.2 * camera.distance
     floor.light = wp.vec3(*appearance.GROUND_LIGHT)
     floor.dark = wp.vec3(*appearance.GROUND_DARK)
     floor.sky = wp.vec3(*appearance.SKY)
