@@ -21,12 +21,14 @@ BUNDLE = (
     "masses",
     "springs",
     "substeps",  # of the contact flow
+    "division",  # steps of this bundle in one step of the run
+    "level",  # its row of the constants
 )
 
 #: What stays as it was packed.
 MODEL = {
     "bundles": np.int64,  # the table of bundles, row by row
-    "constants": np.float64,  # of the run, see kernels.law
+    "constants": np.float64,  # a row for each size of step, see kernels.law
     "rows": np.int32,
     "partners": np.int32,
     "inverse_masses": REAL,  # 1/kg
@@ -43,7 +45,8 @@ STATE = {
     "good_velocities": REAL,
     "oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt): four a lane
     "states": np.int32,  # Status
-    "state_steps": np.int32,  # when it was found
+    "state_times": np.float64,  # when it was found, s
+    "ledgers": REAL,  # work of actuation, losses to damping, drag, friction, and their good copies
 }
 
 #: What looking writes.
@@ -51,9 +54,9 @@ SEEN = {
     "seen_positions": REAL,
     "seen_velocities": REAL,  # synchronised with the positions
     "seen_centers": REAL,  # centre of mass: three a lane
-    "seen_energies": REAL,  # kinetic, gravity, spring, ground: four a lane, J
+    "seen_energies": REAL,  # kinetic, gravity, spring, ground, and the ledger: eight a lane, J
     "seen_states": np.int32,
-    "seen_state_steps": np.int32,
+    "seen_state_times": np.float64,
 }
 
 

@@ -48,6 +48,7 @@ class Features:
     damping: bool
     drag: bool
     integrator: str
+    ledger: bool = False  # whether energies are asked for
 
     @property
     def name(self) -> str:
@@ -77,15 +78,18 @@ def _preamble(features: Features) -> str:
         "DRAG": features.drag,
         "EULER": features.integrator == "euler",
         "CHIN4": features.integrator == "chin4",
+        "LEDGER": features.ledger,
     }
     lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
     lines += [
-        f"const scalar {name} = scalar(model.constants.data[{i}]);"
-        for i, name in enumerate(CONSTANTS)
-    ]
-    lines += [
         f"const int64_t {column}_ = model.bundles.data[bundle * {len(BUNDLE)} + {i}];"
         for i, column in enumerate(BUNDLE)
+    ]
+    lines += [f"const double* const run = model.constants.data + level_ * {len(CONSTANTS)};"]
+    lines += ["const double exact_dt = run[0];"]
+    lines += [
+        f"const scalar {name} = scalar(run[{i}]);"
+        for i, name in enumerate(CONSTANTS)
     ]
     lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
     return vector_dialect(features.precision, features.width) + "\n".join(lines) + LAW + _BUNDLE
@@ -106,20 +110,35 @@ real& sine = *(real*)(state.oscillators.data + 4 * lane_);
 real& cosine = *(real*)(state.oscillators.data + 4 * lane_ + W);
 const real turn_cosine = *(const real*)(state.oscillators.data + 4 * lane_ + 2 * W);
 const real turn_sine = *(const real*)(state.oscillators.data + 4 * lane_ + 3 * W);
+real omega = zero;
+for (int l = 0; LEDGER && l < W; ++l) omega[l] = scalar(model.omegas.data[lane_ + l]);
 const real reach2 = *(const real*)(model.reaches2.data + lane_);
 int* const health = state.states.data + lane_;
-int* const health_step = state.state_steps.data + lane_;
+double* const health_time = state.state_times.data + lane_;
 Vec* const F = (Vec*)scratch.data;
 Vec* const shifted = F + M;
 real* const left_over = (real*)(shifted + M);
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
+// Accounts of the ledger since it was opened: work of the breathing springs, and losses to
+// damping, drag and friction [J].
+real* const ledger = (real*)(state.ledgers.data + 8 * lane_);
+real* const good_ledger = ledger + 4;
+real power = zero;
+auto enter = [&](const Losses& losses, Vec before, Vec after, real w)
+        __attribute__((always_inline)) {
+    if (!LEDGER) return;
+    if (DAMPING) ledger[1] += loss_work(losses.damping, before, after, w);
+    if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
+    if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
+};
+
 auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
 };
 // The whole force on mass i where the masses are at x; forces on later masses are left in F.
-auto row_force = [=](const Vec* x, int i, real si, real co)
+auto row_force = [&](const Vec* x, int i, real si, real co)
         __attribute__((always_inline)) -> Vec {
     const Vec a = x[i];
     Vec f = F[i];
@@ -127,8 +146,12 @@ auto row_force = [=](const Vec* x, int i, real si, real co)
     for (int s = row[i]; s < row[i + 1]; ++s) {
         const int j = partner[s];
         real dx = x[j].x - a.x, dy = x[j].y - a.y, dz = x[j].z - a.z;
-        real pull = spring_pull(squared_length(dx, dy, dz), stiffness(s),
-                                stiffness_times_rest(s, si, co));
+        const real length2 = squared_length(dx, dy, dz), k = stiffness(s);
+        const real q = stiffness_times_rest(s, si, co);
+        if (LEDGER && ACTUATED)
+            power += breathing_power(length2, k, q,
+                                     breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega));
+        const real pull = spring_pull(length2, k, q);
         real px = pull * dx, py = pull * dy, pz = pull * dz;
         f.x += px; f.y += py; f.z += pz;
         F[j].x -= px; F[j].y -= py; F[j].z -= pz;
@@ -162,31 +185,38 @@ auto stopped_lanes = [=]() -> mask {
 
 _ADVANCE = r"""
 // Stops the robots that went wrong since the last check where they were last good.
-auto check = [&](int n) {
+auto check = [&](long long n) {
     mask stopped = stopped_lanes();
     const mask reason = diagnose() & ~stopped;
     if (any(reason != 0)) {
         for (int l = 0; l < W; ++l)
-            if (reason[l] != 0) { health[l] = (int)reason[l]; health_step[l] = n; }
+            if (reason[l] != 0) { health[l] = (int)reason[l]; health_time[l] = double(n) * exact_dt; }
         stopped = stopped_lanes();
     }
-    if (any(stopped)) {
-        for (int i = 0; i < M; ++i) {
-            const Vec a = x[i], b = good_x[i], c = v[i], d = good_v[i];
-            x[i] = good_x[i] = Vec{select(stopped, b.x, a.x), select(stopped, b.y, a.y),
-                                   select(stopped, b.z, a.z)};
-            v[i] = good_v[i] = Vec{select(stopped, d.x, c.x), select(stopped, d.y, c.y),
-                                   select(stopped, d.z, c.z)};
-        }
-    } else {
-        for (int i = 0; i < M; ++i) { good_x[i] = x[i]; good_v[i] = v[i]; }
+    auto restore = [&](real& now, real& good) __attribute__((always_inline)) {
+        now = good = select(stopped, good, now);
+    };
+    for (int i = 0; i < M; ++i) {
+        restore(x[i].x, good_x[i].x); restore(x[i].y, good_x[i].y); restore(x[i].z, good_x[i].z);
+        restore(v[i].x, good_v[i].x); restore(v[i].y, good_v[i].y); restore(v[i].z, good_v[i].z);
     }
+    for (int e = 0; LEDGER && e < 4; ++e) restore(ledger[e], good_ledger[e]);
 };
-auto set_oscillators = [&](int n) {
+auto set_oscillators = [&](long long n) {
     for (int l = 0; l < W; ++l) {
-        const double angle = model.omegas.data[lane_ + l] * (double(n) * model.constants.data[0]);
+        const double angle = model.omegas.data[lane_ + l] * (double(n) * exact_dt);
         sine[l] = scalar(::sin(angle)); cosine[l] = scalar(::cos(angle));
     }
+};
+auto turn_oscillators = [&]() __attribute__((always_inline)) {
+    if (!ACTUATED) return;
+    const real si = sine, co = cosine;
+    sine = si * turn_cosine + co * turn_sine;
+    cosine = co * turn_cosine - si * turn_sine;
+};
+// Work of the breathing springs: their power at the instant of a kick, for the kick's time.
+auto enter_work = [&](scalar time) __attribute__((always_inline)) {
+    if (LEDGER && ACTUATED) { ledger[0] += power * time; power = zero; }
 };
 
 // One kick by the springs as they pull at `where`, and the drift after it.
@@ -196,47 +226,59 @@ auto kick_and_drift = [&](const Vec* where, scalar time, bool start, bool last)
     for (int i = 0; i < M; ++i) {
         const Vec f = row_force(where, i, si, co);
         Vec a = x[i], u = v[i];
-        if (!start) lose_before(u, w[i]);
-        kick(u, f, w[i], a.z, time);
-        lose_after(u, w[i]);
+        const Vec before = u;
+        Losses losses = {};
+        if (!start) lose_before(u, w[i], losses);
+        kick(u, f, w[i], a.z, time, losses);
+        lose_after(u, w[i], losses);
+        const real rise = u.z;  // at the end of the kick: the drift changes it
         real rest = CHIN4 && last ? left_over[i] : zero;
-        drift(a, u, w[i], substeps, rest, last);
+        drift(a, u, w[i], substeps, rest, last, losses);
         if (CHIN4 && !last) left_over[i] = rest;
+        enter(losses, before, Vec{u.x, u.y, rise}, w[i]);
         x[i] = a; v[i] = u;
     }
 };
-auto turn_oscillators = [&]() __attribute__((always_inline)) {
+auto gradient_shift = [&]() __attribute__((always_inline)) {
     const real si = sine, co = cosine;
-    sine = si * turn_cosine + co * turn_sine;
-    cosine = co * turn_cosine - si * turn_sine;
+    for (int i = 0; i < M; ++i) {
+        const Vec a = kick_acceleration(row_force(x, i, si, co), w[i]), b = x[i];
+        shifted[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
+                         b.z + a.z * GRADIENT_SHIFT};
+    }
+};
+auto euler = [&]() __attribute__((always_inline)) {
+    const real si = sine, co = cosine;
+    for (int i = 0; i < M; ++i) {
+        const Vec f = row_force(x, i, si, co);
+        Vec a = x[i], u = v[i];
+        const Vec before = u;
+        Losses losses = {};
+        euler_step(a, u, f, w[i], losses);
+        enter(losses, before, u, w[i]);
+        x[i] = a; v[i] = u;
+    }
 };
 
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
-for (int n = first_step; n < last_step; ++n) {
+const long long end = (long long)last_step * division_;
+for (long long n = (long long)first_step * division_; n < end; ++n) {
     if (n % CHECK_EVERY == 0) {
         check(n);
         if (ACTUATED) set_oscillators(n);
     }
     const bool start = n == 0;
-    if (EULER) {
-        for (int i = 0; i < M; ++i) {
-            const Vec f = row_force(x, i, sine, cosine);
-            Vec a = x[i], u = v[i];
-            euler_step(a, u, f, w[i]);
-            x[i] = a; v[i] = u;
-        }
-    } else {
-        kick_and_drift(x, start ? FIRST_KICK : FIRST_KICK * scalar(2), start, !CHIN4);
-    }
-    if (ACTUATED) turn_oscillators();
+    const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
+    if (EULER) euler();
+    else kick_and_drift(x, time, start, !CHIN4);
+    enter_work(time);
+    turn_oscillators();
     if (CHIN4) {
-        for (int i = 0; i < M; ++i) {
-            const Vec a = kick_acceleration(row_force(x, i, sine, cosine), w[i]), b = x[i];
-            shifted[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
-                             b.z + a.z * GRADIENT_SHIFT};
-        }
+        gradient_shift();
+        enter_work(GRADIENT_KICK);
         kick_and_drift(shifted, GRADIENT_KICK, false, true);
-        if (ACTUATED) turn_oscillators();
+        power = zero;
+        turn_oscillators();
     }
 }
 """
@@ -245,30 +287,34 @@ _OBSERVE = r"""
 Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
 Vec* const seen_v = (Vec*)(seen.seen_velocities.data + state_);
 real* const com = (real*)(seen.seen_centers.data + 3 * lane_);
-real* const energy = (real*)(seen.seen_energies.data + 4 * lane_);
-int* const seen_state = seen.seen_states.data + lane_;
-int* const seen_step = seen.seen_state_steps.data + lane_;
+real* const energy = (real*)(seen.seen_energies.data + 8 * lane_);
 
 const mask before = stopped_lanes();
 const mask reason = diagnose() & ~before;
 const mask stopped = before | (reason != 0);
+const double now = double((long long)step * division_) * exact_dt;
 for (int l = 0; l < W; ++l) {
-    seen_state[l] = health[l] != 0 ? health[l] : (int)reason[l];
-    seen_step[l] = health[l] != 0 ? health_step[l] : reason[l] != 0 ? step : -1;
+    seen.seen_states.data[lane_ + l] = health[l] != 0 ? health[l] : (int)reason[l];
+    seen.seen_state_times.data[lane_ + l] = health[l] != 0 ? health_time[l] : now;
 }
+auto choose = [=](Vec good, Vec now) -> Vec {
+    return Vec{select(stopped, good.x, now.x), select(stopped, good.y, now.y),
+               select(stopped, good.z, now.z)};
+};
 
-real total_mass = zero, cx = zero, cy = zero, cz = zero;
-real kinetic = zero, gravity = zero, springs = zero, ground = zero;
+real total_mass = zero, cx = zero, cy = zero, cz = zero, kinetic = zero, gravity = zero,
+     springs = zero, ground = zero;
+real accounts[4];
+for (int e = 0; LEDGER && e < 4; ++e) accounts[e] = ledger[e];
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
 for (int i = 0; i < M; ++i) {
     const Vec f = row_force(x, i, sine, cosine);
-    Vec a = x[i], u = v[i];
-    const Vec b = good_x[i], good = good_v[i];
-    if (!EULER && step > 0) synchronise(u, f, w[i], a.z);
-    a = Vec{select(stopped, b.x, a.x), select(stopped, b.y, a.y), select(stopped, b.z, a.z)};
-    u = Vec{select(stopped, good.x, u.x), select(stopped, good.y, u.y),
-            select(stopped, good.z, u.z)};
-    seen_x[i] = a; seen_v[i] = u;
+    Vec u = v[i];
+    Losses losses = {};
+    if (!EULER && step > 0) synchronise(u, f, w[i], x[i].z, losses);
+    enter(losses, v[i], u, w[i]);
+    const Vec a = seen_x[i] = choose(good_x[i], x[i]);
+    u = seen_v[i] = choose(good_v[i], u);
     const real m = (zero + scalar(1)) / w[i];
     total_mass += m;
     cx += m * a.x; cy += m * a.y; cz += m * a.z;
@@ -277,15 +323,22 @@ for (int i = 0; i < M; ++i) {
     if (GROUND) ground += ground_force(a.z) * a.z * scalar(-0.5);
 }
 com[0] = cx / total_mass; com[1] = cy / total_mass; com[2] = cz / total_mass;
-for (int i = 0; energy_wanted && i < M; ++i) {
-    const Vec a = seen_x[i];
-    for (int s = row[i]; s < row[i + 1]; ++s) {
-        const Vec b = seen_x[partner[s]];
-        springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z), stiffness(s),
-                                 stiffness_times_rest(s, sine, cosine));
+if (LEDGER) {
+    if (ACTUATED && !EULER && step > 0) ledger[0] += power * FIRST_KICK;
+    for (int i = 0; i < M; ++i) {
+        const Vec a = seen_x[i];
+        for (int s = row[i]; s < row[i + 1]; ++s) {
+            const Vec b = seen_x[partner[s]];
+            springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z),
+                                     stiffness(s), stiffness_times_rest(s, sine, cosine));
+        }
+    }
+    energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;
+    for (int e = 0; e < 4; ++e) {
+        energy[4 + e] = select(stopped, good_ledger[e], ledger[e]);
+        ledger[e] = accounts[e];  // looking changes nothing
     }
 }
-energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;
 """
 
 
@@ -316,7 +369,6 @@ def kernels(features: Features) -> Kernels:
         scratch: wp.array(dtype=real),
         bundle: int,
         step: int,
-        energy_wanted: bool,
         seen: Seen,
     ): ...
 
@@ -338,10 +390,9 @@ def kernels(features: Features) -> Kernels:
         scratch: wp.array(dtype=real),
         which: wp.array(dtype=wp.int32),
         step: int,
-        energy_wanted: bool,
         # outputs
         seen: Seen,
     ):
-        observe_bundle(model, state, scratch, which[wp.tid()], step, energy_wanted, seen)
+        observe_bundle(model, state, scratch, which[wp.tid()], step, seen)
 
     return Kernels(advance, observe)

@@ -63,7 +63,14 @@ def constants(scene, dt: float, integrator: str, speed_limit: float) -> list[flo
 
 
 LAW = r"""
-struct Vec { real x, y, z; };
+struct Vec {
+    real x, y, z;
+    Vec operator+(const Vec& b) const { return Vec{x + b.x, y + b.y, z + b.z}; }
+    Vec operator-(const Vec& b) const { return Vec{x - b.x, y - b.y, z - b.z}; }
+};
+
+// What damping, drag and friction took from a velocity between two drifts.
+struct Losses { Vec damping, drag, friction; };
 
 // A spring of stiffness k and rest length L0 = q / k pulls its first mass with
 // k (L - L0) d / L = (k - q / L) d. TINY keeps 1 / L finite where two masses coincide;
@@ -79,10 +86,20 @@ auto spring_energy = [=](real length2, real k, real q) __attribute__((always_inl
     return stretch_force * stretch_force / k * scalar(0.5);
 };
 
+// Power that a breathing spring puts in: -(tension) L0'(t), with L0' = q' / k.
+auto breathing_power = [=](real length2, real k, real q, real q_rate)
+        __attribute__((always_inline)) -> real {
+    return (q - k * square_root(length2)) * q_rate / k;
+};
+
 // q(t) = k (a + b sin(wt + c)) = qa + qs sin(wt) + qc cos(wt)
 auto breathing = [=](real qa, real qs, real qc, real sine, real cosine)
         __attribute__((always_inline)) -> real {
     return qa + (qs * sine + qc * cosine);
+};
+auto breathing_rate = [=](real qs, real qc, real sine, real cosine, real omega)
+        __attribute__((always_inline)) -> real {
+    return (qs * cosine - qc * sine) * omega;
 };
 
 // Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
@@ -160,18 +177,42 @@ auto kick_acceleration = [=](Vec f, real w) __attribute__((always_inline)) -> Ve
     return Vec{f.x * w + gravity_x, f.y * w + gravity_y,
                GROUND ? f.z * w : f.z * w + gravity_z};
 };
-auto lose_before = [=](Vec& v, real w) __attribute__((always_inline)) {
-    if (DAMPING) { v.x *= decay; v.y *= decay; v.z *= decay; }
-    if (DRAG) drag_flow(v, w, span * scalar(0.5));
+auto damp = [=](Vec& v, Losses& losses) __attribute__((always_inline)) {
+    if (!DAMPING) return;
+    const Vec before = v;
+    v.x *= decay; v.y *= decay; v.z *= decay;
+    if (LEDGER) losses.damping = losses.damping + (before - v);
 };
-auto lose_after = [=](Vec& v, real w) __attribute__((always_inline)) {
-    if (DRAG) drag_flow(v, w, span * scalar(0.5));
-    if (DAMPING) { v.x *= decay; v.y *= decay; v.z *= decay; }
+auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__((always_inline)) {
+    if (!DRAG) return;
+    const Vec before = v;
+    drag_flow(v, w, time);
+    if (LEDGER) losses.drag = losses.drag + (before - v);
 };
-auto kick = [=](Vec& v, Vec f, real w, real z, scalar time) __attribute__((always_inline)) {
+auto rub = [=](Vec& v, real impulse, Losses& losses) __attribute__((always_inline)) {
+    if (!COULOMB) return;
+    const Vec before = v;
+    coulomb(v.x, v.y, impulse);
+    if (LEDGER) losses.friction = losses.friction + (before - v);
+};
+// The classroom's friction belongs to the kick, since it works on the force.
+auto kick = [=](Vec& v, Vec f, real w, real z, scalar time, Losses& losses)
+        __attribute__((always_inline)) {
     Vec a = kick_acceleration(f, w);
-    if (GROUND && COURSE) course_friction(a.x, a.y, v.x, v.y, ground_force(z) * w);
-    v.x += a.x * time; v.y += a.y * time; v.z += a.z * time;
+    const Vec free = {v.x + a.x * time, v.y + a.y * time, v.z + a.z * time};
+    if (GROUND && COURSE) {
+        course_friction(a.x, a.y, v.x, v.y, ground_force(z) * w);
+        v.x += a.x * time; v.y += a.y * time; v.z += a.z * time;
+        if (LEDGER) losses.friction = losses.friction + (free - v);
+    } else v = free;
+};
+auto lose_before = [=](Vec& v, real w, Losses& losses) __attribute__((always_inline)) {
+    damp(v, losses);
+    slow_down(v, w, span * scalar(0.5), losses);
+};
+auto lose_after = [=](Vec& v, real w, Losses& losses) __attribute__((always_inline)) {
+    slow_down(v, w, span * scalar(0.5), losses);
+    damp(v, losses);
 };
 
 // A mass in free flight follows its parabola; where the parabola's ends are not both above the
@@ -179,56 +220,68 @@ auto kick = [=](Vec& v, Vec f, real w, real z, scalar time) __attribute__((alway
 // so that a mass that sticks does not move at all. The impulse it may use is the drift's own, in
 // proportion to the kick before it: the first drift of a chin4 step, after a third of the step's
 // kicks, leaves a third of its impulse to the second.
-auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool last)
-        __attribute__((always_inline)) {
-    if (GROUND) {
-        real z = x.z + (v.z + gravity_z * span * scalar(0.5)) * span, u = v.z + gravity_z * span;
-        mask touching = (x.z < zero) | (z < zero);
-        if (CHIN4 && last ? any(touching | (left_over > zero)) : any(touching)) {
-            real z_contact = x.z, u_contact = v.z;
-            real impulse = contact_flow(z_contact, u_contact, w, substeps);
-            z = select(touching, z_contact, z);
-            u = select(touching, u_contact, u);
-            impulse = select(touching, impulse, zero);
-            if (CHIN4) {
-                real usable = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
-                left_over = impulse - usable;
-                impulse = usable;
-            }
-            if (COULOMB) coulomb(v.x, v.y, impulse);
-        } else if (CHIN4) left_over = zero;
-        x.z = z; v.z = u;
-    } else {
-        x.z += v.z * span;
+auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, real& left_over,
+                      bool last, Losses& losses) __attribute__((always_inline)) {
+    z = x.z + (v.z + gravity_z * span * scalar(0.5)) * span;
+    u = v.z + gravity_z * span;
+    const mask touching = (x.z < zero) | (z < zero);
+    if (any(touching)) {
+        real z_contact = x.z, u_contact = v.z;
+        real impulse = contact_flow(z_contact, u_contact, w, substeps);
+        z = select(touching, z_contact, z);
+        u = select(touching, u_contact, u);
+        impulse = select(touching, impulse, zero);
+        if (CHIN4) {
+            const real usable = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
+            left_over = impulse - usable;
+            impulse = usable;
+        }
+        rub(v, impulse, losses);
+    } else if (CHIN4) {
+        if (last && any(left_over > zero)) rub(v, left_over, losses);
+        left_over = zero;
     }
-    x.x += v.x * span; x.y += v.y * span;
+};
+auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool last,
+                 Losses& losses) __attribute__((always_inline)) {
+    real z = x.z + v.z * span, u = v.z;
+    if (GROUND) touch_down(x, v, z, u, w, substeps, left_over, last, losses);
+    x.x += v.x * span; x.y += v.y * span; x.z = z;
+    v.z = u;
 };
 
 // The velocity at t_n, from the state before its kicks: what the last part of them adds, with the
 // friction of as much time, so that a mass that sticks is reported at rest.
-auto synchronise = [=](Vec& v, Vec f, real w, real z) __attribute__((always_inline)) {
-    lose_before(v, w);
-    kick(v, f, w, z, FIRST_KICK);
-    if (GROUND && COULOMB) coulomb(v.x, v.y, ground_force(z) * w * FIRST_KICK);
+auto synchronise = [=](Vec& v, Vec f, real w, real z, Losses& losses)
+        __attribute__((always_inline)) {
+    lose_before(v, w, losses);
+    kick(v, f, w, z, FIRST_KICK, losses);
+    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, losses);
+};
+
+// Work of a loss that changed the velocity of a mass by -lost while it went from `before` to
+// `after`: impulse times mean velocity. All impulses so weighed add up to the change of kinetic
+// energy exactly, and a mass that sticks loses nothing.
+auto loss_work = [=](Vec lost, Vec before, Vec after, real w) __attribute__((always_inline)) -> real {
+    return (lost.x * (before.x + after.x) + lost.y * (before.y + after.y)
+            + lost.z * (before.z + after.z)) * scalar(0.5) / w;
 };
 
 // Symplectic Euler, the classroom's method: all forces at t_n, then velocity, then position.
-auto euler_step = [=](Vec& x, Vec& v, Vec f, real w) __attribute__((always_inline)) {
-    real ax = f.x * w + gravity_x, ay = f.y * w + gravity_y, az = f.z * w + gravity_z;
-    if (GROUND) {
-        real push = ground_force(x.z) * w;
-        if (COURSE) course_friction(ax, ay, v.x, v.y, push);
-        v.x += ax * dt; v.y += ay * dt;
-        if (COULOMB) coulomb(v.x, v.y, push * dt);
-        v.z += (az + push) * dt;
-    } else {
-        v.x += ax * dt; v.y += ay * dt; v.z += az * dt;
-    }
-    if (DAMPING) {
-        const scalar whole = decay * decay;
-        v.x *= whole; v.y *= whole; v.z *= whole;
-    }
-    if (DRAG) drag_flow(v, w, dt);
+auto euler_step = [=](Vec& x, Vec& v, Vec f, real w, Losses& losses)
+        __attribute__((always_inline)) {
+    const real push = GROUND ? ground_force(x.z) * w : zero;
+    Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, f.z * w + gravity_z + push};
+    const Vec free = {v.x + a.x * dt, v.y + a.y * dt, v.z + a.z * dt};
+    if (GROUND && COURSE) {
+        course_friction(a.x, a.y, v.x, v.y, push);
+        v.x += a.x * dt; v.y += a.y * dt; v.z += a.z * dt;
+        if (LEDGER) losses.friction = losses.friction + (free - v);
+    } else v = free;
+    if (GROUND) rub(v, push * dt, losses);
+    damp(v, losses);
+    damp(v, losses);
+    slow_down(v, w, dt, losses);
     x.x += v.x * dt; x.y += v.y * dt; x.z += v.z * dt;
 };
 """
