@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
 
     from warp_springs.io.usd_stage import Looks
-    from warp_springs.simulation import Result
+    from warp_springs.result import Result
 
 __all__ = ["export_usd"]
 

@@ -15,14 +15,14 @@ from warp_springs.robot import Robot
 from warp_springs.view import appearance
 
 if TYPE_CHECKING:
-    from warp_springs.simulation import Result
+    from warp_springs.result import Result
 
 FloatArray = NDArray[np.float64]
 
 FARTHEST = 1e6
 """Distance from the origin [m] beyond which a frame shows an explosion and not a robot."""
 _GAP = 0.35
-"""Free space between neighbours on the grid, in diameters of the largest body."""
+"""Free space between neighbours on the grid, in sides of the largest footprint."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Only the exporter imports this module, when it has something to write.
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt  # noqa: TID253
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, Vt  # noqa: TID253
 
 from warp_springs.io.usd_geometry import (
     TUBE_SIDES,
@@ -141,7 +141,7 @@ class SkelRobot:
         self,
         name: str,
         part: Part,
-        material,
+        material: UsdShade.Material,
         color: tuple[float, float, float] | None = None,
     ) -> UsdGeom.Mesh:
         """A mesh under the skeleton, each vertex on one joint with the weight 1."""

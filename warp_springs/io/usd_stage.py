@@ -120,8 +120,8 @@ def add_ground(
     Usd.ModelAPI(ground).SetKind("component")
     constant_color(ground, appearance.GROUND_LIGHT)
     halves = (("Light", ~dark, looks.ground_light), ("Dark", dark, looks.ground_dark))
+    family = UsdShade.Tokens.materialBind
     for name, tiles, material in halves:
-        family = UsdShade.Tokens.materialBind
         subset = UsdGeom.Subset.CreateGeomSubset(
             ground, name, UsdGeom.Tokens.face, ints(np.flatnonzero(tiles)), family
         )

@@ -194,16 +194,16 @@ def arrange(poses: Sequence[Pose], *, skin: bool = True, floor: bool = True) -> 
         floor: Whether there is a floor; it lies below z = 0 by the radius of the largest sphere.
     """
     counts = [len(p.positions) for p in poses]
-    starts = np.cumsum([0, *counts])
-    masses = int(starts[-1])
-    triangles = [p.faces + start for p, start in zip(poses, starts, strict=False) if skin]
+    masses = sum(counts)
+    starts = np.cumsum(counts) - counts
+    triangles = [p.faces + start for p, start in zip(poses, starts, strict=True) if skin]
     triangles = np.concatenate([np.zeros((0, 3), np.int32), *triangles])
     sizes = [np.linalg.norm(np.ptp(p.positions, axis=0)) for p in poses]
     return Drawing(
         points=np.concatenate([p.positions for p in poses]),
         triangles=triangles,
         triangle_color=np.tile(np.float32(appearance.SKIN), (len(triangles), 1)),
-        bars=np.concatenate([p.springs + s for p, s in zip(poses, starts, strict=False)]),
+        bars=np.concatenate([p.springs + s for p, s in zip(poses, starts, strict=True)]),
         bar_radius=np.repeat([p.bar_radius for p in poses], [len(p.springs) for p in poses]),
         bar_color=np.concatenate([p.bar_color for p in poses]),
         balls=np.arange(masses, dtype=np.int32),
@@ -242,7 +242,7 @@ def with_labels(
             stroke_width=max(1, image.height // 360),
             stroke_fill=_LABEL_HALO,
         )
-    return np.asarray(image)
+    return np.array(image)
 
 
 def _stress_scale(result: Result, robot: int, positions: NDArray, time: float) -> float:

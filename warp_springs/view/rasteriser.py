@@ -210,7 +210,7 @@ class Rasteriser:
         """Draw the sun's map and its table of sums, and return the light that reads them."""
         axes = view_axes(np.negative(TO_SUN))
         seen = drawing.points @ axes.T
-        thickest = max(1e-3, *drawing.bar_radius, *drawing.ball_radius)
+        thickest = np.concatenate(([1e-3], drawing.bar_radius, drawing.ball_radius)).max()
         low, high = seen.min(axis=0) - thickest, seen.max(axis=0) + thickest
         # steps of scale and whole texels keep the shadow's edges still from frame to frame
         edge = 2.0 ** (math.ceil(4 * math.log2(1.02 * float((high - low)[:2].max()))) / 4)
