@@ -16,7 +16,7 @@ from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Ground, Scene, damping_rate
 from warp_springs.simulation import Simulation
-from warp_springs.stability import Limits, Status
+from warp_springs.stability import Limits, Status, stable_dt
 from warp_springs.startup import quiet
 from warp_springs.variants import Variants
 
@@ -36,6 +36,7 @@ __all__ = [
     "quiet",
     "render",
     "shapes",
+    "stable_dt",
 ]
 
 try:

@@ -17,27 +17,23 @@ import numpy as np
 from warp_springs.kernels.buffers import BUNDLE, dtype_of
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
-from warp_springs.kernels.law import DRIFTS
+from warp_springs.method import Method
 from warp_springs.packing import (
-    MASS_FIELDS,
-    SPRING_FIELDS,
+    ALL_FIELDS,
     Strip,
     aligned,
     coefficients,
     lane_major,
+    largest,
     longest_springs,
     not_finite,
     sort_rows,
 )
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
-from warp_springs.stability import Status
 from warp_springs.variants import Variants
 
 __all__ = ["Batch", "Group", "Slots"]
-
-#: Steps of the contact flow within one drift: no fewer, no more, if the caller does not choose.
-SUBSTEPS = (8, 64)
 
 #: Buffers that are packed; all others are made by the simulation.
 PACKED = (
@@ -116,11 +112,7 @@ class Batch:
     Args:
         robots: The robots.
         scene: Their world.
-        dt: Step [s].
-        precision: ``"float64"`` or ``"float32"``.
-        integrator: ``"leapfrog"`` or ``"euler"``.
-        contact_substeps: Steps of the contact flow within one drift, or ``None`` to choose them.
-        stretch: Limit on the length of a spring, see ``Limits.stretch``.
+        method: How they are stepped.
 
     Attributes:
         slots: Where each robot lives.
@@ -128,32 +120,21 @@ class Batch:
         bundles: The table of bundles, shape (B, len(BUNDLE)), int64.
         arrays: The flat buffers of ``PACKED``, by name, on 64-byte boundaries.
         substeps: Contact sub-steps of each robot, shape (N,).
+        levels: Halvings of the step of the run for each robot, shape (N,).
     """
 
-    def __init__(
-        self,
-        robots: Sequence[Robot],
-        scene: Scene,
-        *,
-        dt: float,
-        precision: str,
-        integrator: str,
-        contact_substeps: int | None,
-        stretch: float,
-    ) -> None:
-        self._scene, self._stretch = scene, stretch
-        self._precision, self._integrator = precision, integrator
-        self._span = dt / DRIFTS[integrator]
-        self._fixed_substeps = contact_substeps
+    def __init__(self, robots: Sequence[Robot], scene: Scene, method: Method) -> None:
+        self._scene, self._method = scene, method
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
         self.groups: list[Group] = []
         self.substeps = np.ones(len(robots), np.int64)
+        self.levels = np.zeros(len(robots), np.int64)
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
 
-        # An absurd robot may overflow here; its status will say so once it is stepped.
-        with np.errstate(over="ignore", invalid="ignore"):
+        # An absurd robot may overflow here; its status will say so.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             strips = self._strips(robots)
             for width, actuated in sorted(strips, reverse=True):  # wide ones first: alignment
                 first = len(self)
@@ -169,95 +150,87 @@ class Batch:
 
     def _strips(self, robots: Sequence[Robot]) -> dict[tuple[int, bool], list[Strip]]:
         """The robots by width of their bundles, by whether they actuate, and by topology."""
-        width = native_width(self._precision)
+        width = native_width(self._method.precision)
         strips: dict[tuple[int, bool], list[Strip]] = defaultdict(list)
         alone: dict[bool, list[int]] = defaultdict(list)
-        for ids, springs, fields in _cohorts(robots):
-            if fields is None:
-                robot = robots[int(ids[0])]
-                alone[robot.is_actuated].append(int(ids[0]))
+        for cohort in _cohorts(robots):
+            if isinstance(cohort, int):
+                alone[robots[cohort].is_actuated].append(cohort)
                 continue
-            actuated = (fields["amplitude"] != 0.0).any(axis=1)
-            substeps = self._contact_substeps(fields["masses"].min(axis=1))
-            for kind in np.unique(np.stack([actuated, substeps]), axis=1).T:
-                members = np.flatnonzero((actuated == kind[0]) & (substeps == kind[1]))
+            for actuated, members in self._alike(cohort):
                 # A robot that would be the only one of its bundle needs no other lanes.
                 if len(members) % width == 1:
-                    alone[bool(kind[0])].append(int(ids[members[-1]]))
+                    alone[actuated].append(int(cohort.ids[members[-1]]))
                     members = members[:-1]
                 if len(members):
-                    chosen = {name: values[members] for name, values in fields.items()}
-                    strip = Strip.stacked(ids[members], springs, chosen)
-                    strips[width, bool(kind[0])].append(strip)
+                    strips[width, actuated].append(cohort.take(members))
         for actuated, ids in alone.items():
             strips[1, actuated].append(Strip.ragged(ids, [robots[i] for i in ids]))
         return strips
 
-    def _contact_substeps(self, lightest: np.ndarray) -> np.ndarray:
-        """Contact sub-steps of robots whose lightest masses are given [kg].
-
-        A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
-        oscillation, sqrt(K_G / m) times one drift, below a sixteenth of a radian a sub-step.
-        """
-        if self._scene.ground is None or self._integrator == "euler":
-            return np.ones(len(lightest), np.int64)
-        if self._fixed_substeps is not None:
-            return np.full(len(lightest), self._fixed_substeps, np.int64)
-        phase = np.sqrt(self._scene.ground.stiffness / lightest) * self._span
-        wanted = np.clip(16.0 * phase, *SUBSTEPS)
-        return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+    def _alike(self, cohort: Strip) -> Iterator[tuple[bool, np.ndarray]]:
+        """Members of a cohort that may share bundles: alike in actuation, step and sub-steps."""
+        actuated = largest(np.abs(cohort.fields["amplitude"]), cohort.counts) > 0.0
+        levels = self._method.levels(cohort, self._scene)
+        substeps = self._method.substeps(cohort, self._scene, levels)
+        kinds, kind = np.unique(np.stack([actuated, levels, substeps]), axis=1, return_inverse=True)
+        for index in range(kinds.shape[1]):
+            yield bool(kinds[0, index]), np.flatnonzero(kind.ravel() == index)
 
     def _features(self, width: int, actuated: bool) -> Features:
         scene, ground = self._scene, self._scene.ground
         return Features(
-            precision=self._precision,
+            precision=self._method.precision,
             width=width,
             actuated=actuated,
             ground=ground is not None,
             friction=ground.friction if ground and ground.has_friction else "none",
             damping=scene.damping > 0.0,
             drag=scene.drag > 0.0,
-            integrator=self._integrator,
+            integrator=self._method.integrator,
         )
 
     def _pack(self, strip: Strip, width: int, actuated: bool) -> None:
         """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
-        n, fields = len(strip.ids), strip.fields
-        first_mass = np.cumsum(strip.masses) - strip.masses
-        lightest = np.minimum.reduceat(fields["masses"], first_mass)
-        heaviest = np.maximum.reduceat(fields["masses"], first_mass)
-        self.substeps[strip.ids] = self._contact_substeps(lightest)
+        n, method = len(strip.ids), self._method
+        levels = method.levels(strip, self._scene)
+        self.levels[strip.ids] = levels
+        self.substeps[strip.ids] = method.substeps(strip, self._scene, levels)
         within = np.arange(n)
-        self._slot[strip.ids, 0] = len(self) + within // width
-        self._slot[strip.ids, 1] = within % width
-        self._slot[strip.ids, 2] = width
+        self._slot[strip.ids] = np.stack(
+            [len(self) + within // width, within % width, np.full(n, width)], axis=1
+        )
         self._tables.append(self._describe(strip, width, 4 if actuated else 2))
 
         order, row, partner = sort_rows(strip)
-        longest = longest_springs(strip)
-        reach = np.where(longest > 0.0, self._stretch * longest, np.inf)
-        turn = fields["omega"] * self._span
-        start = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
-        one = np.ones(n, np.int64)
+        self._append("rows", row)
+        self._append("partners", partner)
+        fields, one = strip.fields, np.ones(n, np.int64)
+        turn = fields["omega"] * method.spans(levels)
+        oscillators = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
         per_robot = {  # values, and how many rows of them each robot has
             "inverse_masses": (1.0 / fields["masses"], strip.masses),
             "coefficients": (coefficients(fields, order, actuated), strip.counts),
             "omegas": (fields["omega"], one),
             "positions": (fields["positions"], strip.masses),
             "velocities": (fields["velocities"], strip.masses),
-            "oscillators": (start, one),
+            "oscillators": (oscillators, one),
         }
-        # A robot whose numbers do not exist in this precision is never stepped; a mass that is too
-        # large for it would come out as one without an inverse.
-        invalid = heaviest > np.finfo(self._precision).max
-        self._append("rows", row)
-        self._append("partners", partner)
+        # A mass too large for the precision would come out as one without an inverse.
+        invalid = largest(fields["masses"], strip.masses) > np.finfo(method.precision).max
         for name, (values, rows) in per_robot.items():
-            cast = values.astype(dtype_of(name, self._precision), copy=False)
+            cast = values.astype(dtype_of(name, method.precision), copy=False)
             invalid |= not_finite(cast, rows)
-            self._append(name, lane_major(cast, n, width) if strip.shared else cast.ravel())
-        for name, values in {"reaches2": reach**2, "states": invalid * Status.INVALID}.items():
-            self._append(name, lane_major(values.astype(dtype_of(name, self._precision)), n, width))
+            self._append(name, lane_major(cast, n, width))
+        longest = longest_springs(strip)
+        reach = np.where(longest > 0.0, method.limits.stretch * longest, np.inf)
+        for name, values in {
+            "reaches2": reach**2,
+            "states": method.birth(strip, levels, invalid),
+        }.items():
+            self._append(
+                name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)
+            )
 
     def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
         """The rows of the table of bundles for a strip."""
@@ -275,7 +248,10 @@ class Batch:
             for column, (buffer, sizes) in blocks.items()
         }
         table |= {"masses": masses, "springs": counts}
-        table["substeps"] = self.substeps[strip.ids[::width]]
+        leaders = strip.ids[::width]
+        table["substeps"] = self.substeps[leaders]
+        table["level"] = self.levels[leaders]
+        table["division"] = 2 ** self.levels[leaders]
         return np.stack([table[column] for column in BUNDLE], axis=1).astype(np.int64)
 
     def _append(self, name: str, values: np.ndarray) -> None:
@@ -286,7 +262,7 @@ class Batch:
         """Join the parts and look up where each robot went."""
         self.bundles = np.concatenate(self._tables)
         self.arrays = {
-            name: aligned(parts, dtype_of(name, self._precision))
+            name: aligned(parts, dtype_of(name, self._method.precision))
             for name, parts in self._parts.items()
         }
         self._parts.clear()
@@ -303,22 +279,18 @@ class Batch:
         )
 
 
-_Cohort = tuple[np.ndarray, np.ndarray, "dict[str, np.ndarray] | None"]
-
-
-def _cohorts(robots: Sequence[Robot]) -> Iterator[_Cohort]:
-    """Robots of one topology: their indices, springs, and stacked fields (None for one alone)."""
-    names = (*MASS_FIELDS, *SPRING_FIELDS, "omega")
+def _cohorts(robots: Sequence[Robot]) -> Iterator[Strip | int]:
+    """Robots of one topology as one strip; a robot that shares its topology with none by index."""
     if isinstance(robots, Variants) and len(robots) > 1:
-        fields = {name: robots.array(name) for name in names}
-        yield np.arange(len(robots)), robots.body.springs, fields
+        yield Strip.variants(robots)
         return
     by_topology: dict[bytes, list[int]] = defaultdict(list)
     for index, robot in enumerate(robots):
         by_topology[robot.topology].append(index)
     for members in by_topology.values():
+        if len(members) == 1:
+            yield members[0]
+            continue
         chosen = [robots[i] for i in members]
-        fields = None
-        if len(members) > 1:
-            fields = {name: np.stack([getattr(r, name) for r in chosen]) for name in names}
-        yield np.array(members), chosen[0].springs, fields
+        fields = {name: np.stack([getattr(r, name) for r in chosen]) for name in ALL_FIELDS}
+        yield Strip.stacked(np.array(members), chosen[0].springs, fields)

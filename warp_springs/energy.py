@@ -1,4 +1,4 @@
-"""Energies of the robots of a run."""
+"""Energies of the robots of a run, and the ledger that says where they come from and go to."""
 
 from __future__ import annotations
 
@@ -11,21 +11,43 @@ __all__ = ["Energy"]
 
 @dataclass(frozen=True)
 class Energy:
-    """Mechanical energy [J] of every robot at every frame; arrays of shape (N, F), float64.
+    """Energy [J] of every robot at every frame; arrays of shape (N, F), float64.
+
+    The first four are what a robot holds, the others what it was given or lost since the start of
+    the run. ``residual`` is what the ledger cannot account for: it is the error of the integrator,
+    of its order in dt, and a detector of energy from nowhere.
 
     Attributes:
         kinetic: sum of m v^2 / 2, with velocities synchronised with the positions.
         gravity: -sum of m g . x, zero at the origin.
         spring: sum of k (L - L0(t))^2 / 2.
         ground: sum of K_G z^2 / 2 over the masses below z = 0.
+        work: Work of the breathing springs, the integral of -sum of k (L - L0) dL0/dt.
+        damping_loss: Loss to the damping rate.
+        drag_loss: Loss to drag.
+        friction_loss: Loss to friction on the ground.
     """
 
     kinetic: np.ndarray
     gravity: np.ndarray
     spring: np.ndarray
     ground: np.ndarray
+    work: np.ndarray
+    damping_loss: np.ndarray
+    drag_loss: np.ndarray
+    friction_loss: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
-        """Sum of the four, shape (N, F); constant without actuation, losses and friction."""
+        """Kinetic, gravity, spring and ground energy, shape (N, F)."""
         return self.kinetic + self.gravity + self.spring + self.ground
+
+    @property
+    def losses(self) -> np.ndarray:
+        """Loss to damping, drag and friction, shape (N, F)."""
+        return self.damping_loss + self.drag_loss + self.friction_loss
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Change of the total since the first frame, less the work, plus the losses, (N, F)."""
+        return self.total - self.total[:, :1] - self.work + self.losses

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_springs.robot import Robot
+from warp_springs.variants import Variants
 
 __all__ = [
     "Strip",
     "aligned",
     "coefficients",
     "lane_major",
+    "largest",
     "longest_springs",
     "not_finite",
     "sort_rows",
@@ -21,6 +23,7 @@ __all__ = [
 
 MASS_FIELDS = ("masses", "positions", "velocities")
 SPRING_FIELDS = ("stiffness", "rest_length", "amplitude", "phase")
+ALL_FIELDS = (*MASS_FIELDS, *SPRING_FIELDS, "omega")
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,12 @@ class Strip:
         return cls(ids, np.full(n, masses), np.full(n, len(springs)), springs, True, flat)
 
     @classmethod
+    def variants(cls, robots: Variants) -> Strip:
+        """All variants of one body."""
+        fields = {name: robots.array(name) for name in ALL_FIELDS}
+        return cls.stacked(np.arange(len(robots)), robots.body.springs, fields)
+
+    @classmethod
     def ragged(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
         """Robots of any topologies."""
         fields = {
@@ -63,6 +72,15 @@ class Strip:
         counts = np.array([robot.n_springs for robot in robots])
         springs = np.concatenate([robot.springs for robot in robots])
         return cls(np.asarray(ids), masses, counts, springs, False, fields)
+
+    def take(self, members: np.ndarray) -> Strip:
+        """Some robots of a strip whose robots share one topology."""
+        n, masses, counts = len(self.ids), self.masses[members], self.counts[members]
+        fields = {
+            name: values.reshape(n, -1, *values.shape[1:])[members].reshape(-1, *values.shape[1:])
+            for name, values in self.fields.items()
+        }
+        return Strip(self.ids[members], masses, counts, self.springs, True, fields)
 
     @property
     def all_springs(self) -> np.ndarray:
@@ -121,19 +139,19 @@ def longest_springs(strip: Strip) -> np.ndarray:
     start, end = strip.all_springs.T.astype(np.intp) + first_mass
     d = fields["positions"].take(end, axis=0)
     d -= fields["positions"].take(start, axis=0)
-    initial = np.sqrt(_largest(np.einsum("ij,ij->i", d, d), strip.counts))
+    initial = np.sqrt(largest(np.einsum("ij,ij->i", d, d), strip.counts))
     return np.maximum(
-        initial, _largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
+        initial, largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
     )
 
 
-def _largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The largest of each run of ``counts`` non-negative values; 0 for an empty run."""
-    largest = np.zeros(len(counts))
+    found = np.zeros(len(counts))
     some = counts > 0
     if some.any():
-        largest[some] = np.maximum.reduceat(values, (np.cumsum(counts) - counts)[some])
-    return largest
+        found[some] = np.maximum.reduceat(values, (np.cumsum(counts) - counts)[some])
+    return found
 
 
 def not_finite(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -142,7 +160,7 @@ def not_finite(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     if good.all():
         return np.zeros(len(counts), bool)
     rows = ~good.reshape(len(values), -1).all(axis=1)
-    return _largest(rows.astype(float), counts) > 0.0
+    return largest(rows.astype(float), counts) > 0.0
 
 
 def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:

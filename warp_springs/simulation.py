@@ -12,7 +12,8 @@ import numpy as np
 from warp_springs.batch import Batch
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
-from warp_springs.kernels.law import EVALUATIONS, constants
+from warp_springs.kernels.law import EVALUATIONS
+from warp_springs.method import AUTO_DT, Method
 from warp_springs.packing import aligned
 from warp_springs.result import Result
 from warp_springs.robot import Robot
@@ -30,7 +31,8 @@ class Simulation:
     Args:
         robots: A ``Robot``, a sequence of them, or ``Variants`` of one body.
         scene: The world, the same for all; ``Scene()`` by default.
-        dt: Step [s].
+        dt: Step [s], or ``"auto"``: a millisecond, halved for each robot until it is half of
+            ``ws.stable_dt`` or less, so that one stiff robot does not slow a thousand.
         device: ``"cpu"``.
         precision: ``"float64"``, or ``"float32"`` for about twice the speed.
         integrator: ``"leapfrog"`` (kick - drift - kick, second order; gravity and the ground are
@@ -51,11 +53,11 @@ class Simulation:
         self,
         robots: Robot | Sequence[Robot],
         scene: Scene | None = None,
-        dt: float = 1e-4,
+        dt: float | Literal["auto"] = 1e-4,
         *,
         device: str = "cpu",
         precision: Literal["float64", "float32"] = "float64",
-        integrator: Literal["leapfrog", "euler", "chin4"] = "leapfrog",
+        integrator: Literal["chin4", "leapfrog", "euler"] = "leapfrog",
         contact_substeps: int | None = None,
         threads: int | None = None,
         limits: Limits | None = None,
@@ -63,30 +65,27 @@ class Simulation:
         self.robots = _check_robots(robots)
         self.scene = _check_type("scene", Scene() if scene is None else scene, Scene)
         self.limits = _check_type("limits", Limits() if limits is None else limits, Limits)
-        check_number("dt", dt, above=0.0)
+        auto = isinstance(dt, str)
+        if auto:
+            check_choice("dt", dt, ("auto",))
+        else:
+            check_number("dt", dt, above=0.0)
         check_choice("device", str(device), ("cpu",))
         check_choice("precision", precision, ("float64", "float32"))
-        check_choice("integrator", integrator, ("leapfrog", "euler", "chin4"))
+        check_choice("integrator", integrator, ("chin4", "leapfrog", "euler"))
         if contact_substeps is not None:
             _check_count("contact_substeps", contact_substeps)
             if integrator == "euler":
                 raise ValueError("contact_substeps: 'euler' has none")
         if threads is not None:
             _check_count("threads", threads)
-        self.dt, self.device = float(dt), str(device)
+        self.dt, self.device = AUTO_DT if auto else float(dt), str(device)
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
         self._interrupted = False
-        self._batch = Batch(
-            self.robots,
-            self.scene,
-            dt=self.dt,
-            precision=precision,
-            integrator=integrator,
-            contact_substeps=contact_substeps,
-            stretch=self.limits.stretch,
-        )
+        self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
+        self._batch = Batch(self.robots, self.scene, self._method)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads)
 
@@ -99,6 +98,11 @@ class Simulation:
     def contact_substeps(self) -> np.ndarray:
         """Contact sub-steps of each robot, shape (N,); 1 without a ground and for ``"euler"``."""
         return self._batch.substeps.copy()
+
+    @property
+    def robot_dt(self) -> np.ndarray:
+        """The step that each robot takes [s], shape (N,): ``dt``, or less with ``dt="auto"``."""
+        return self.dt / 2.0**self._batch.levels
 
     def run(
         self,
@@ -133,6 +137,9 @@ class Simulation:
             raise RuntimeError("this simulation was interrupted during a run; make a new one")
         first, last = self._step, self._step + steps
         frame_steps = self._frame_steps(first, last, fps, energy)
+        self._buffers["ledgers"][:] = 0.0
+        for piece in self._slices:
+            piece.prepare(ledger=energy)
         tapes = [Tape(s, self._batch.slots, recorded, frame_steps, energy) for s in self._slices]
 
         started = time.perf_counter()
@@ -149,18 +156,17 @@ class Simulation:
         batch, real = self._batch, np.dtype(self.precision)
         buffers = batch.arrays | {
             "bundles": batch.bundles.ravel(),
-            "constants": np.array(
-                constants(self.scene, self.dt, self.integrator, self.limits.speed)
-            ),
+            "constants": self._method.constants(self.scene).ravel(),
         }
         for name in ("positions", "velocities"):
             buffers[f"good_{name}"] = aligned([buffers[name]], real)
             buffers[f"seen_{name}"] = aligned([buffers[name]], real)
         lanes = len(buffers["omegas"])
         buffers["seen_centers"] = aligned([np.zeros(3 * lanes, real)], real)
-        buffers["seen_energies"] = aligned([np.zeros(4 * lanes, real)], real)
-        for name in ("state_steps", "seen_states", "seen_state_steps"):
-            buffers[name] = np.zeros(lanes, np.int32)
+        buffers["seen_energies"] = aligned([np.zeros(8 * lanes, real)], real)
+        buffers["ledgers"] = aligned([np.zeros(8 * lanes, real)], real)
+        buffers["seen_states"] = np.zeros(lanes, np.int32)
+        buffers["state_times"], buffers["seen_state_times"] = np.zeros(lanes), np.zeros(lanes)
         return buffers
 
     def _check_record(self, record: Iterable[int] | None, fps: float | None) -> np.ndarray:
@@ -189,8 +195,10 @@ class Simulation:
         lanes = slots.lane_indices(slice(None), 1)[:, 0]
         centers = slots.lane_indices(slice(None), 3)
         status = buffers["seen_states"][lanes].astype(np.int64)
-        stopped_at = buffers["seen_state_steps"][lanes].astype(np.int64)
-        until = np.where(status == 0, self._step, np.clip(stopped_at, first, self._step))
+        stopped_at = buffers["seen_state_times"][lanes]
+        # Steps before a robot was stopped count; each is of the robot's own size.
+        until = np.where(status == 0, self.time, np.clip(stopped_at, first * self.dt, self.time))
+        steps = np.rint((until - first * self.dt) / self.robot_dt).astype(np.int64)
         return Result(
             robots=self.robots,
             scene=self.scene,
@@ -202,13 +210,12 @@ class Simulation:
             end_time=self.time,
             steps=self._step - first,
             status=status,
-            status_time=np.where(status == 0, np.nan, stopped_at * self.dt),
+            status_time=np.where(status == 0, np.nan, stopped_at),
             center_of_mass=buffers["seen_centers"][centers].astype(np.float64),
             times=np.array(frame_steps, np.float64) * self.dt,
             recorded=tuple(recorded.tolist()),
             energy=_energy(tapes, len(self.robots)),
-            spring_evaluations=int((slots.springs * (until - first)).sum())
-            * EVALUATIONS[self.integrator],
+            spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
             _slots=slots,
             _positions=buffers["seen_positions"].copy(),
@@ -221,9 +228,10 @@ def _energy(tapes: Sequence[Tape], robots: int) -> Energy | None:
     """Energies of all robots, collected from the slices."""
     if not tapes[0].energy:
         return None
-    table = np.zeros((4, robots, len(tapes[0].frame_steps)))
+    table = np.zeros((8, robots, len(tapes[0].frame_steps)))
     for tape in tapes:
         table[:, tape.members] = tape.energies.transpose(2, 1, 0)
+    table[4:] -= table[4:, :, :1]  # the accounts are opened with the first frame
     return Energy(*table)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import warp as wp
@@ -27,8 +27,10 @@ SCRATCH_GAP = 256
 
 def cut(batch: Batch, buffers: Mapping[str, np.ndarray], threads: int) -> list[Slice]:
     """Cut the groups of a batch into slices of about equal work."""
-    springs, masses = (batch.bundles[:, BUNDLE.index(name)] for name in ("springs", "masses"))
-    work = springs + 2 * masses
+    springs, masses, division = (
+        batch.bundles[:, BUNDLE.index(name)] for name in ("springs", "masses", "division")
+    )
+    work = (springs + 2 * masses) * division
     pieces = SLICES_PER_THREAD * threads if threads > 1 else 1
     target = work.sum() / pieces
     slices = []
@@ -61,7 +63,7 @@ class Slice:
     ) -> None:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
-        advance, observe = kernels(group.features)
+        self._features = group.features
         real = np.dtype(group.features.precision)
         scratch = np.zeros(SCRATCH * largest * group.features.width + SCRATCH_GAP, real)
         given = {
@@ -71,9 +73,21 @@ class Slice:
         }
         for struct in structs(group.features.precision):
             given[struct.key.lower()] = _filled(struct, buffers)
+        self._given = given
         self._everything = given["which"]
-        self._advance = _recorded(advance, last - first, given)
-        self._observe = _recorded(observe, last - first, given)
+        self._launches: dict[bool, tuple[wp.Launch, wp.Launch]] = {}
+        self.prepare(ledger=False)
+
+    def prepare(self, ledger: bool) -> None:
+        """Use the kernels with or without the energy ledger from now on."""
+        if ledger not in self._launches:
+            advance, observe = kernels(replace(self._features, ledger=ledger))
+            count = self.last - self.first
+            self._launches[ledger] = (
+                _recorded(advance, count, self._given),
+                _recorded(observe, count, self._given),
+            )
+        self._advance, self._observe = self._launches[ledger]
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all bundles from ``first_step`` to ``last_step``."""
@@ -81,14 +95,13 @@ class Slice:
         self._advance.set_param_by_name("last_step", last_step)
         self._advance.launch()
 
-    def observe(self, step: int, energy: bool, which: wp.array | None = None) -> None:
+    def observe(self, step: int, which: wp.array | None = None) -> None:
         """Write what is seen of some bundles (default all) at ``step``; changes no state."""
         which = self._everything if which is None else which
         if len(which):
             self._observe.set_dim(len(which))
             self._observe.set_param_by_name("which", which)
             self._observe.set_param_by_name("step", step)
-            self._observe.set_param_by_name("energy_wanted", energy)
             self._observe.launch()
 
 
@@ -100,7 +113,7 @@ class Tape:
         members: Robots of the slice, shape (n,).
         recorded: Those whose frames are kept.
         frames: Their positions [m], flat, shape (F, 3 * sum of M).
-        energies: Energies [J] of the members, shape (F, n, 4), if they are asked for.
+        energies: Energies and ledger [J] of the members, shape (F, n, 8), if they are asked for.
         done: Steps done so far.
     """
 
@@ -124,8 +137,8 @@ class Tape:
         self.recorded = inside(self.recorded)
         self._state = self.slots.state_indices(self.recorded)
         self.frames = np.empty((count, len(self._state)))
-        self._lanes = self.slots.lane_indices(self.members, 4)
-        self.energies = np.empty((count if self.energy else 0, len(self.members), 4))
+        self._lanes = self.slots.lane_indices(self.members, 8)
+        self.energies = np.empty((count if self.energy else 0, len(self.members), 8))
         bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
         self._which = None if self.energy else _on_device(bundles)
 
@@ -134,11 +147,11 @@ class Tape:
         at = first
         for index, step in enumerate(self.frame_steps):
             at = self._advance(first, at, step, stop)
-            self.slice.observe(step, self.energy, self._which)
+            self.slice.observe(step, self._which)
             self._take(index)
         at = self._advance(first, at, last, stop)
         if not stop.is_set():
-            self.slice.observe(last, False)
+            self.slice.observe(last)
 
     def _advance(self, first: int, at: int, target: int, stop: threading.Event) -> int:
         steps = max(1, int(LAUNCH_WORK / max(self.slice.work, 1)))

@@ -1,4 +1,4 @@
-"""Health of the robots: why one was stopped, and the limits that stop it.
+"""Health of the robots: which step is safe, why a robot was stopped, and the limits that stop it.
 
 An evolutionary search makes absurd robots. Each robot of a batch carries its own status; one that
 goes wrong is stopped where it was last good, and its neighbours do not change by one bit.
@@ -7,11 +7,22 @@ goes wrong is stopped where it was last good, and its neighbours do not change b
 from __future__ import annotations
 
 import enum
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from warp_springs.checks import check_number
+import numpy as np
 
-__all__ = ["Limits", "Status"]
+from warp_springs.checks import check_choice, check_number
+from warp_springs.packing import Strip, largest
+from warp_springs.robot import Robot
+from warp_springs.scene import Scene
+from warp_springs.variants import Variants
+
+__all__ = ["Limits", "Status", "certainly_unstable", "stable_dt", "stable_step"]
+
+Integrator = Literal["chin4", "leapfrog", "euler"]
 
 
 class Status(enum.IntEnum):
@@ -24,8 +35,12 @@ class Status(enum.IntEnum):
     OVERSTRETCHED = 2
     #: A mass is faster than ``Limits.speed``.
     TOO_FAST = 3
+    #: A mass is deeper in the ground than ``Limits.depth``.
+    TOO_DEEP = 4
+    #: The step is certain to be unstable for the robot's springs; it was never stepped.
+    UNSTABLE_STEP = 5
     #: A number of the robot does not exist in the precision of the run; it was never stepped.
-    INVALID = 4
+    INVALID = 6
 
 
 @dataclass(frozen=True)
@@ -36,11 +51,138 @@ class Limits:
         speed: Largest speed of a mass [m/s].
         stretch: Largest length of a spring, as a multiple of the longest spring of the robot
             (the largest of its initial lengths and of its rest lengths plus amplitudes).
+        depth: Largest depth of a mass below the surface of the ground [m].
     """
 
     speed: float = 1000.0
     stretch: float = 5.0
+    depth: float = 1.0
 
     def __post_init__(self) -> None:
         check_number("Limits.speed", self.speed, above=0.0)
         check_number("Limits.stretch", self.stretch, above=1.0)
+        check_number("Limits.depth", self.depth, above=0.0)
+
+
+def stable_dt(
+    robots: Robot | Variants | Sequence[Robot],
+    scene: Scene | None = None,
+    integrator: Integrator = "chin4",
+) -> float | np.ndarray:
+    """The largest step that is certainly stable [s]: a float for one robot, else shape (N,).
+
+    A bound, not an estimate. Every pose of a robot has its frequencies below
+    sqrt(max over springs of (sum of k/m at one end + sum of k/m at the other)), by Gershgorin's
+    theorem on the stiffness matrix with each spring at its full stiffness in any direction; the
+    ground adds K_G / m of the lightest mass. The step is the largest with which the integrator
+    keeps an oscillator of both stiffnesses bounded. It says nothing of accuracy, nor of springs
+    whose rest length turns negative.
+
+    Raises:
+        ValueError: The integrator is unknown.
+    """
+    check_choice("integrator", integrator, ("chin4", "leapfrog", "euler"))
+    scene = Scene() if scene is None else scene
+    if isinstance(robots, Robot):
+        return float(stable_step(Strip.ragged([0], [robots]), scene, integrator)[0])
+    if isinstance(robots, Variants):
+        return stable_step(Strip.variants(robots), scene, integrator)
+    return stable_step(Strip.ragged(range(len(robots)), robots), scene, integrator)
+
+
+def stable_step(strip: Strip, scene: Scene, integrator: str) -> np.ndarray:
+    """``stable_dt`` for the robots of a strip, shape (n,)."""
+    springs = _largest_frequency(strip)
+    if scene.ground is None:
+        return _limit(np.zeros_like(springs), integrator) / _positive(springs)
+    ground = np.sqrt(scene.ground.stiffness * largest(1.0 / strip.fields["masses"], strip.masses))
+    both = np.hypot(springs, ground)
+    share = np.arctan2(ground, springs)
+    return np.minimum(_limit(share, integrator), _limit(0.0 * share, integrator)) / _positive(both)
+
+
+def _largest_frequency(strip: Strip) -> np.ndarray:
+    """A bound of the largest angular frequency of the springs in any pose [rad/s], shape (n,)."""
+    fields, ends = strip.fields, _ends(strip)
+    per_mass = np.zeros(len(fields["masses"]))
+    for end in ends:
+        per_mass += np.bincount(end, fields["stiffness"], minlength=len(per_mass))
+    per_mass /= fields["masses"]
+    return np.sqrt(largest(per_mass[ends[0]] + per_mass[ends[1]], strip.counts))
+
+
+def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndarray:
+    """Robots whose springs are sure to blow up with the steps ``dt``, shape (n,) bool.
+
+    At rest the springs reach at least the frequency sqrt(k (1/m_i + 1/m_j)) of every spring, by
+    Rayleigh's quotient along it.
+    """
+    fields = strip.fields
+    start, end = _ends(strip)
+    w = 1.0 / fields["masses"]
+    certain = np.sqrt(largest(fields["stiffness"] * (w[start] + w[end]), strip.counts))
+    return certain * dt > _limit(0.0 * certain, integrator)
+
+
+def _ends(strip: Strip) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of all springs, counted over the masses of all robots."""
+    first = np.repeat(np.cumsum(strip.masses) - strip.masses, strip.counts)
+    start, end = strip.all_springs.T.astype(np.intp) + first
+    return start, end
+
+
+def _positive(values: np.ndarray) -> np.ndarray:
+    return np.maximum(values, np.finfo(float).tiny)
+
+
+def _limit(share: np.ndarray, integrator: str) -> np.ndarray:
+    """The largest stable phase sqrt(ws^2 + wg^2) dt, where tan(share) = wg / ws, from a table."""
+    shares, limits = _limits(integrator)
+    cell = np.clip(np.searchsorted(shares, share, side="right") - 1, 0, len(shares) - 2)
+    return np.where(share <= 0.0, limits[0], np.minimum(limits[cell], limits[cell + 1]))
+
+
+@functools.cache
+def _limits(integrator: str) -> tuple[np.ndarray, np.ndarray]:
+    """Stability of the linear test problem x'' = -(ws^2 + wg^2) x, springs kicking, ground exact.
+
+    The map of one step is a product of kicks and drifts with determinant one: bounded while
+    its trace stays within 2 in size.
+    """
+    shares = np.linspace(0.0, np.pi / 2, 257)
+    phases = np.linspace(0.0, 8.0, 4001)[1:]
+    springs = np.cos(shares)[:, None] * phases
+    ground = np.sin(shares)[:, None] * phases
+    stable = np.abs(_trace(springs, ground, integrator)) <= 2.0 + 1e-9
+    first_unstable = np.where(stable.all(axis=1), len(phases) - 1, np.argmin(stable, axis=1))
+    return shares, phases[np.maximum(first_unstable - 1, 0)]
+
+
+def _trace(springs: np.ndarray, ground: np.ndarray, integrator: str) -> np.ndarray:
+    """Trace of the map of one step, for phases ws dt and wg dt."""
+
+    def kick(strength):  # v -= strength * x, in units of dt
+        one, none = np.ones_like(springs), np.zeros_like(springs)
+        return np.stack([np.stack([one, none]), np.stack([-strength, one])])
+
+    def drift(part):  # exact flow under the ground for a part of the step
+        angle = ground * part
+        sinc = part * np.sinc(angle / np.pi)
+        return np.stack(
+            [np.stack([np.cos(angle), sinc]), np.stack([-ground * np.sin(angle), np.cos(angle)])]
+        )
+
+    s = springs**2
+    if integrator == "euler":
+        steps = [
+            kick(s + ground**2),
+            np.stack([np.stack([1 + 0 * s, 1 + 0 * s]), np.stack([0 * s, 1 + 0 * s])]),
+        ]
+    elif integrator == "leapfrog":
+        steps = [kick(s), drift(1.0)]
+    else:
+        steps = [kick(s / 3), drift(0.5), kick(2 / 3 * s * (1 - s / 24)), drift(0.5)]
+    product = steps[0]
+    for step in steps[1:]:
+        product = np.einsum("ij...,jk...->ik...", step, product)
+    return product[0, 0] + product[1, 1]

@@ -87,10 +87,7 @@ def _preamble(features: Features) -> str:
     ]
     lines += [f"const double* const run = model.constants.data + level_ * {len(CONSTANTS)};"]
     lines += ["const double exact_dt = run[0];"]
-    lines += [
-        f"const scalar {name} = scalar(run[{i}]);"
-        for i, name in enumerate(CONSTANTS)
-    ]
+    lines += [f"const scalar {name} = scalar(run[{i}]);" for i, name in enumerate(CONSTANTS)]
     lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
     return vector_dialect(features.precision, features.width) + "\n".join(lines) + LAW + _BUNDLE
 
@@ -158,23 +155,27 @@ auto row_force = [&](const Vec* x, int i, real si, real co)
     }
     return f;
 };
-// The reasons, by lane, why a robot must be stopped now: 1 not finite, 2 overstretched, 3 too fast
-// (the values of warp_springs.Status), 0 none.
+// The reasons, by lane, why a robot must be stopped now, as values of warp_springs.Status: 1 not
+// finite, 2 overstretched, 3 too fast, 4 too deep; 0 none.
 auto diagnose = [=]() -> mask {
     const real limit2 = zero + speed_limit * speed_limit;
     real poison = zero;
-    mask fast = zero > zero, stretched = fast;
+    mask fast = zero > zero, stretched = fast, deep = fast;
     for (int i = 0; i < M; ++i) {
         const Vec a = x[i], u = v[i];
         poison += (a.x + a.y + a.z + u.x + u.y + u.z) * scalar(0);
         fast |= u.x * u.x + u.y * u.y + u.z * u.z > limit2;
+        if (GROUND) deep |= a.z < -depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
             stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
         }
     }
     const mask finite = poison == zero;
-    return finite ? (fast ? (mask{} + 3) : (stretched ? (mask{} + 2) : mask{})) : (mask{} + 1);
+    mask reason = deep & 4;
+    reason = stretched ? (mask{} + 2) : reason;
+    reason = fast ? (mask{} + 3) : reason;
+    return finite ? reason : (mask{} + 1);
 };
 auto stopped_lanes = [=]() -> mask {
     mask stopped;
@@ -190,7 +191,10 @@ auto check = [&](long long n) {
     const mask reason = diagnose() & ~stopped;
     if (any(reason != 0)) {
         for (int l = 0; l < W; ++l)
-            if (reason[l] != 0) { health[l] = (int)reason[l]; health_time[l] = double(n) * exact_dt; }
+            if (reason[l] != 0) {
+                health[l] = (int)reason[l];
+                health_time[l] = double(n) * exact_dt;
+            }
         stopped = stopped_lanes();
     }
     auto restore = [&](real& now, real& good) __attribute__((always_inline)) {

@@ -37,6 +37,7 @@ CONSTANTS = (
     "kinetic_friction",
     "drag",  # c of the drag -c |v| v [kg/m]
     "speed_limit",  # beyond it a robot is stopped [m/s]
+    "depth_limit",  # [m]
 )
 
 
@@ -45,7 +46,7 @@ DRIFTS = {"euler": 1, "leapfrog": 1, "chin4": 2}
 EVALUATIONS = {"euler": 1, "leapfrog": 1, "chin4": 3}
 
 
-def constants(scene, dt: float, integrator: str, speed_limit: float) -> list[float]:
+def constants(scene, dt: float, integrator: str, limits) -> list[float]:
     """Values of ``CONSTANTS`` for a scene, in float64."""
     ground = scene.ground
     span = dt / DRIFTS[integrator]
@@ -58,7 +59,8 @@ def constants(scene, dt: float, integrator: str, speed_limit: float) -> list[flo
         ground.static_friction if ground else 0.0,
         ground.kinetic_friction if ground else 0.0,
         scene.drag,
-        speed_limit,
+        limits.speed,
+        limits.depth,
     ]
 
 
@@ -262,7 +264,8 @@ auto synchronise = [=](Vec& v, Vec f, real w, real z, Losses& losses)
 // Work of a loss that changed the velocity of a mass by -lost while it went from `before` to
 // `after`: impulse times mean velocity. All impulses so weighed add up to the change of kinetic
 // energy exactly, and a mass that sticks loses nothing.
-auto loss_work = [=](Vec lost, Vec before, Vec after, real w) __attribute__((always_inline)) -> real {
+auto loss_work = [=](Vec lost, Vec before, Vec after, real w)
+        __attribute__((always_inline)) -> real {
     return (lost.x * (before.x + after.x) + lost.y * (before.y + after.y)
             + lost.z * (before.z + after.z)) * scalar(0.5) / w;
 };

@@ -1,0 +1,88 @@
+"""How robots are stepped: integrator, precision, and the step of each robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_springs.kernels.law import DRIFTS, constants
+from warp_springs.packing import Strip, largest
+from warp_springs.scene import Scene
+from warp_springs.stability import Limits, Status, certainly_unstable, stable_step
+
+__all__ = ["AUTO_DT", "LEVELS", "Method"]
+
+#: The step of a run with ``dt="auto"`` [s]; each robot takes it, or a power of two fewer.
+AUTO_DT = 1e-3
+#: Halvings of the step that ``dt="auto"`` may choose.
+LEVELS = 12
+#: The part of the largest stable step that ``dt="auto"`` stays within: at the limit itself the
+#: fastest vibrations are bounded, but wrong.
+AUTO_PART = 0.5
+#: Steps of the contact flow within one drift: no fewer, no more, if the caller does not choose.
+SUBSTEPS = (8, 64)
+
+
+@dataclass(frozen=True)
+class Method:
+    """How the robots of a simulation are stepped.
+
+    What it decides for a robot depends on that robot alone, so that its bits do not depend on the
+    batch it is in.
+
+    Attributes:
+        dt: Step of the run [s].
+        auto: Whether a robot's step is the step of the run divided by a power of two of its own.
+        integrator: ``"chin4"``, ``"leapfrog"`` or ``"euler"``.
+        precision: ``"float64"`` or ``"float32"``.
+        contact_substeps: Steps of the contact flow within one drift, or ``None`` to choose them.
+        limits: What stops a robot.
+    """
+
+    dt: float
+    auto: bool
+    integrator: str
+    precision: str
+    contact_substeps: int | None
+    limits: Limits
+
+    def levels(self, strip: Strip, scene: Scene) -> np.ndarray:
+        """Halvings of the step of the run for each robot, shape (n,)."""
+        if not self.auto:
+            return np.zeros(len(strip.ids), np.int64)
+        wanted = self.dt / (AUTO_PART * stable_step(strip, scene, self.integrator))
+        return np.clip(np.ceil(np.log2(np.clip(wanted, 1.0, 2.0**LEVELS))), 0, LEVELS).astype(int)
+
+    def substeps(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
+        """Contact sub-steps in a drift of each robot, shape (n,).
+
+        A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
+        oscillation, sqrt(K_G / m) times a drift, below a sixteenth of a radian a sub-step.
+        """
+        if scene.ground is None or self.integrator == "euler":
+            return np.ones(len(strip.ids), np.int64)
+        if self.contact_substeps is not None:
+            return np.full(len(strip.ids), self.contact_substeps, np.int64)
+        omega = np.sqrt(
+            scene.ground.stiffness * largest(1.0 / strip.fields["masses"], strip.masses)
+        )
+        wanted = np.clip(16.0 * omega * self.spans(levels), *SUBSTEPS)
+        return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+
+    def spans(self, levels: np.ndarray) -> np.ndarray:
+        """Duration of a drift of each robot [s], shape (n,)."""
+        return self.dt / 2.0**levels / DRIFTS[self.integrator]
+
+    def birth(self, strip: Strip, levels: np.ndarray, invalid: np.ndarray) -> np.ndarray:
+        """Status of each robot before its first step, shape (n,)."""
+        unstable = certainly_unstable(strip, self.dt / 2.0**levels, self.integrator)
+        return np.select([invalid, unstable], [Status.INVALID, Status.UNSTABLE_STEP], Status.OK)
+
+    def constants(self, scene: Scene) -> np.ndarray:
+        """The constants of the kernels, a row for each level."""
+        rows = [
+            constants(scene, self.dt / 2**level, self.integrator, self.limits)
+            for level in range(LEVELS + 1 if self.auto else 1)
+        ]
+        return np.array(rows)
