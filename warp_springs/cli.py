@@ -123,8 +123,8 @@ def _energy_figure(result: Result, path: Path) -> None:
 
     figure = Figure(figsize=(9, 6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
-    plots.energies(result, 0, ax=above)
-    plots.height(result, 0, ax=below)
+    plots.energies(above, result)
+    plots.height(below, result)
     above.set_xlabel("")
     figure.savefig(path, dpi=120)
 

@@ -144,15 +144,15 @@ def test_neighbours_of_garbage_do_not_change_by_one_bit(precision, integrator):
 @pytest.mark.parametrize(
     ("name", "reasons"),
     [
-        ("too stiff for the step", {"NONFINITE", "TOO_FAST", "OVERSTRETCHED"}),
-        ("absurdly stiff", {"NONFINITE", "TOO_FAST", "OVERSTRETCHED"}),
+        ("too stiff for the step", {"UNSTABLE_STEP"}),
+        ("absurdly stiff", {"UNSTABLE_STEP"}),
         ("one mass at 1e300 m/s", {"TOO_FAST", "NONFINITE"}),
         ("one mass at 1e30 m/s", {"TOO_FAST"}),
         ("one mass at 2 km/s", {"TOO_FAST"}),
         ("every mass at 1e300 m/s", {"TOO_FAST", "NONFINITE"}),
         ("breathing a kilometre", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
         ("breathing 1e300 m", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
-        ("light as 1e-300 kg", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
+        ("light as 1e-300 kg", {"UNSTABLE_STEP"}),
         ("springs of 1e300 m", {"TOO_FAST", "OVERSTRETCHED", "NONFINITE"}),
         ("isolated masses", {"OK"}),
         ("one mass", {"OK"}),
