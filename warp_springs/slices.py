@@ -12,7 +12,7 @@ import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.kernels.buffers import BUNDLE, structs
-from warp_springs.kernels.lanes import SCRATCH, kernels
+from warp_springs.kernels.lanes import kernels, scratch_size
 from warp_springs.packing import aligned
 
 __all__ = ["Slice", "Tape", "cut", "run_all"]
@@ -41,7 +41,8 @@ def cut(batch: Batch, buffers: Mapping[str, np.ndarray], threads: int) -> list[S
         edges = np.unique([0, *inner[inner < group.count], group.count]) + group.first
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             load = int(work[first:last].sum()) * group.features.width
-            slices.append(Slice(group, first, last, load, int(masses[first:last].max()), buffers))
+            largest = (int(masses[first:last].max()), int(springs[first:last].max()))
+            slices.append(Slice(group, first, last, load, largest, buffers))
     return slices
 
 
@@ -58,16 +59,16 @@ class Slice:
         first: int,
         last: int,
         work: int,
-        largest: int,
+        largest: tuple[int, int],
         buffers: Mapping[str, np.ndarray],
     ) -> None:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
         self._features = group.features
         real = np.dtype(group.features.precision)
-        scratch = np.zeros(SCRATCH * largest * group.features.width + SCRATCH_GAP, real)
+        size = scratch_size(group.features, *largest) + SCRATCH_GAP
         given = {
-            "scratch": _on_device(aligned([scratch], real)),
+            "scratch": _on_device(aligned([np.zeros(size, real)], real)),
             "which": _on_device(np.arange(first, last, dtype=np.int32)),
             "first_bundle": first,
         }
@@ -145,7 +146,8 @@ class Tape:
     def run(self, first: int, last: int, stop: threading.Event) -> None:
         """Step the slice from ``first`` to ``last``, with the frames between."""
         at = first
-        for index, step in enumerate(self.frame_steps):
+        frames = self.frame_steps if self.energy or len(self.recorded) else ()
+        for index, step in enumerate(frames):
             at = self._advance(first, at, step, stop)
             self.slice.observe(step, self._which)
             self._take(index)

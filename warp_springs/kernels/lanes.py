@@ -22,8 +22,9 @@ import warp as wp
 from warp_springs.kernels.buffers import BUNDLE, structs
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.law import CONSTANTS, LAW
+from warp_springs.kernels.strands import strand_passes, strand_scratch
 
-__all__ = ["CHECK_EVERY", "SCRATCH", "Features", "Kernels", "kernels"]
+__all__ = ["CHECK_EVERY", "Features", "Kernels", "kernels", "scratch_size"]
 
 #: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
 #: of the simulation.
@@ -56,9 +57,15 @@ class Features:
         return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
 
 
-#: Scratch values a lane of each mass: its force, and for chin4 where the gradient kick looks, and
-#: the impulse left over for friction.
-SCRATCH = 7
+def scratch_size(features: Features, masses: int, springs: int) -> int:
+    """Scratch values for bundles of so many masses and springs.
+
+    A force, where the gradient kick of chin4 looks, and the impulse it leaves over for friction,
+    for each mass and lane; more where a robot's own springs are the lanes.
+    """
+    lanes = 7 * masses * features.width
+    strand = strand_scratch(features.precision, masses, springs) if features.width == 1 else 0
+    return max(lanes, strand)
 
 
 class Kernels(NamedTuple):
@@ -113,8 +120,8 @@ const real reach2 = *(const real*)(model.reaches2.data + lane_);
 int* const health = state.states.data + lane_;
 double* const health_time = state.state_times.data + lane_;
 Vec* const F = (Vec*)scratch.data;
-Vec* const shifted = F + M;
-real* const left_over = (real*)(shifted + M);
+Vec* const shifted_x = F + M;
+real* const left_over = (real*)(shifted_x + M);
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
@@ -184,7 +191,7 @@ auto stopped_lanes = [=]() -> mask {
 };
 """
 
-_ADVANCE = r"""
+_CONTROL = r"""
 // Stops the robots that went wrong since the last check where they were last good.
 auto check = [&](long long n) {
     mask stopped = stopped_lanes();
@@ -218,15 +225,19 @@ auto turn_oscillators = [&]() __attribute__((always_inline)) {
     sine = si * turn_cosine + co * turn_sine;
     cosine = co * turn_cosine - si * turn_sine;
 };
+"""
+
+_PASSES = r"""
 // Work of the breathing springs: their power at the instant of a kick, for the kick's time.
 auto enter_work = [&](scalar time) __attribute__((always_inline)) {
-    if (LEDGER && ACTUATED) { ledger[0] += power * time; power = zero; }
+    if (ACTUATED) { ledger[0] += power * time; power = zero; }
 };
 
-// One kick by the springs as they pull at `where`, and the drift after it.
-auto kick_and_drift = [&](const Vec* where, scalar time, bool start, bool last)
+// One kick by the springs, as they pull at x or where the gradient kick looks, and its drift.
+auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
     const real si = sine, co = cosine;
+    const Vec* const where = shifted ? shifted_x : x;
     for (int i = 0; i < M; ++i) {
         const Vec f = row_force(where, i, si, co);
         Vec a = x[i], u = v[i];
@@ -247,8 +258,8 @@ auto gradient_shift = [&]() __attribute__((always_inline)) {
     const real si = sine, co = cosine;
     for (int i = 0; i < M; ++i) {
         const Vec a = kick_acceleration(row_force(x, i, si, co), w[i]), b = x[i];
-        shifted[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
-                         b.z + a.z * GRADIENT_SHIFT};
+        shifted_x[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
+                           b.z + a.z * GRADIENT_SHIFT};
     }
 };
 auto euler = [&]() __attribute__((always_inline)) {
@@ -264,28 +275,41 @@ auto euler = [&]() __attribute__((always_inline)) {
     }
 };
 
-for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
-const long long end = (long long)last_step * division_;
-for (long long n = (long long)first_step * division_; n < end; ++n) {
+auto prepare = [&]() { for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero}; };
+auto begin = []() {};
+auto end = []() {};
+"""
+
+# The steps, in terms of either layout's passes.
+_STEPS = r"""
+const long long past = (long long)last_step * division_;
+prepare();
+begin();
+for (long long n = (long long)first_step * division_; n < past; ++n) {
     if (n % CHECK_EVERY == 0) {
+        end();
         check(n);
+        begin();
         if (ACTUATED) set_oscillators(n);
     }
     const bool start = n == 0;
     const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
     if (EULER) euler();
-    else kick_and_drift(x, time, start, !CHIN4);
-    enter_work(time);
+    else kick_and_drift(false, time, start, !CHIN4);
+    if (LEDGER) enter_work(time);
     turn_oscillators();
     if (CHIN4) {
         gradient_shift();
-        enter_work(GRADIENT_KICK);
-        kick_and_drift(shifted, GRADIENT_KICK, false, true);
+        if (LEDGER) enter_work(GRADIENT_KICK);
+        kick_and_drift(true, GRADIENT_KICK, false, true);
         power = zero;
         turn_oscillators();
     }
 }
+end();
 """
+
+_NO_LEDGER = "auto enter_work = [](scalar) {};"
 
 _OBSERVE = r"""
 Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
@@ -356,7 +380,11 @@ def kernels(features: Features) -> Kernels:
     module = wp.get_module(features.name)
     wp.set_module_options(COMPILER_OPTIONS, module)
 
-    @wp.func_native(preamble + _ADVANCE)
+    # The ledger adds up in the order of the lanes; it is rarely asked for.
+    strand = features.width == 1 and not features.ledger
+    passes = strand_passes(features.precision) + _NO_LEDGER if strand else _PASSES
+
+    @wp.func_native(preamble + _CONTROL + passes + _STEPS)
     def advance_bundle(
         model: Model,
         state: State,

@@ -1,0 +1,216 @@
+"""A robot that shares its topology with nobody, stepped with its own springs and masses as lanes.
+
+A pass over the springs works in three sweeps. Along the rows, d = p_j - p_i of every spring is
+taken as one short vector (x, y, z, pad) and kept. Then W springs at a time are transposed, so that
+the lanes hold W springs: the law computes W pulls at once, and each is spread over its own d. Along
+the rows again the forces are added up, in the same order as a bundle adds them. The masses are
+moved W at a time, transposed likewise; the pad of a position holds the inverse mass.
+
+The order of every sum is that of ``kernels.lanes`` and the law is the same text, so a robot's bits
+are the same in both.
+"""
+
+from warp_springs.kernels.dialect import native_width, vector_dialect
+from warp_springs.kernels.law import LAW
+
+__all__ = ["strand_passes", "strand_scratch", "strand_width"]
+
+
+def strand_width(precision: str) -> int:
+    """Springs or masses of one robot in the lanes: a register's, but no fewer than four."""
+    return max(4, native_width(precision))
+
+
+def strand_scratch(precision: str, masses: int, springs: int) -> int:
+    """Scratch values that the largest robot of a slice needs."""
+    width = strand_width(precision)
+    masses, springs = masses + width, springs + 2 * width
+    values = 17 * masses + 8 * springs
+    indices = 2 * masses + 9 * springs  # no larger than a value each
+    return values + indices
+
+
+def strand_passes(precision: str) -> str:
+    """C++ text: the passes of ``kernels.lanes`` for one robot."""
+    width = strand_width(precision)
+
+    def shuffle(*pattern: int) -> str:
+        # Within each group of four lanes; from 4 on the second vector.
+        return ", ".join(
+            str(q + lane % 4 + (width if lane >= 4 else 0))
+            for q in range(0, width, 4)
+            for lane in pattern
+        )
+
+    spread = "".join(
+        f"auto spread{i} = [](real g) __attribute__((always_inline)) -> real "
+        f"{{ return __builtin_shufflevector(g, g, {shuffle(i, i, i, i)}); }};\n"
+        for i in range(4)
+    )
+    return f"""
+auto pass = [&](int job, scalar time, bool start, bool last) {{
+    {vector_dialect(precision, width)}
+    {LAW}
+    // Four vectors of W / 4 rows (x, y, z, w) each, to x, y, z, w of W rows, and back.
+    auto transpose = [](real& a, real& b, real& c, real& d) __attribute__((always_inline)) {{
+        const real ab = __builtin_shufflevector(a, b, {shuffle(0, 4, 1, 5)});
+        const real ba = __builtin_shufflevector(a, b, {shuffle(2, 6, 3, 7)});
+        const real cd = __builtin_shufflevector(c, d, {shuffle(0, 4, 1, 5)});
+        const real dc = __builtin_shufflevector(c, d, {shuffle(2, 6, 3, 7)});
+        a = __builtin_shufflevector(ab, cd, {shuffle(0, 1, 4, 5)});
+        b = __builtin_shufflevector(ab, cd, {shuffle(2, 3, 6, 7)});
+        c = __builtin_shufflevector(ba, dc, {shuffle(0, 1, 4, 5)});
+        d = __builtin_shufflevector(ba, dc, {shuffle(2, 3, 6, 7)});
+    }};
+    {spread}
+    {_PASS}
+}};
+{_JOBS}
+"""
+
+
+_JOBS = r"""
+auto prepare = [&]() { pass(6, scalar(0), false, false); };
+auto begin = [&]() { pass(0, scalar(0), false, false); };
+auto end = [&]() { pass(1, scalar(0), false, false); };
+auto euler = [&]() { pass(2, dt, false, true); };
+auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last) {
+    pass(shifted ? 5 : 3, time, start, last);
+};
+auto gradient_shift = [&]() { pass(4, scalar(0), false, false); };
+"""
+
+_PASS = r"""
+typedef scalar quad __attribute__((vector_size(4 * sizeof(scalar))));
+const int MP = (M + W - 1) / W * W, SP = (S + W - 1) / W * W;
+quad* const X = (quad*)scratch.data;
+quad* const V = X + MP;
+quad* const FQ = V + MP;
+quad* const shifted_x = FQ + MP;
+real* const left = (real*)(shifted_x + MP);
+quad* const D = (quad*)((scalar*)left + MP);
+real* const P = (real*)(D + SP + W);
+const int coefficients = ACTUATED ? 4 : 2;
+int* const lower = (int*)(P + coefficients * (SP / W));
+
+// Springs that end and that start at each mass, for four masses side by side: entry k of group g,
+// mass i, is at 4 (start[g] + k) + i % 4. Lists that are shorter than the longest of their group
+// are filled with the spring SP, whose force is zero.
+const int G = MP / 4;
+int* const ends_start = lower + SP;
+int* const starts_start = ends_start + G + 1;
+int* const count = starts_start + G + 1;
+int* const ends = count + MP;
+auto fill_lists = [=]() {
+    int* list = ends;
+    for (int out = 0; out < 2; ++out) {
+        int* const begin = out ? starts_start : ends_start;
+        for (int i = 0; i < MP; ++i) count[i] = 0;
+        for (int s = 0; s < S; ++s) ++count[out ? lower[s] : partner[s]];
+        begin[0] = 0;
+        for (int g = 0; g < G; ++g) {
+            int longest = 0;
+            for (int i = 4 * g; i < 4 * g + 4; ++i)
+                longest = count[i] > longest ? count[i] : longest;
+            begin[g + 1] = begin[g] + longest;
+        }
+        for (int e = 0; e < 4 * begin[G]; ++e) list[e] = SP;
+        for (int i = 0; i < MP; ++i) count[i] = 0;
+        for (int s = 0; s < S; ++s) {
+            const int i = out ? lower[s] : partner[s];
+            list[4 * (begin[i / 4] + count[i]++) + i % 4] = s;
+        }
+        if (!out) list += 4 * begin[G];
+    }
+};
+
+if (job == 6) {
+    for (int s = S; s <= SP; ++s) D[s] = quad{};
+    // Lane l of a batch is row (l % 4) (W / 4) + l / 4: how the transposed rows lie.
+    for (int s = 0; s < SP; s += W)
+        for (int l = 0; l < W; ++l) {
+            const int from = s + (l % 4) * (W / 4) + l / 4;
+            for (int c = 0; c < coefficients; ++c)
+                P[s / W * coefficients + c][l] =
+                    from < S ? p[coefficients * from + c][0] : scalar(0);
+        }
+    for (int i = 0; i < M; ++i)
+        for (int s = row[i]; s < row[i + 1]; ++s) lower[s] = i;
+    fill_lists();
+    return;
+}
+if (job == 0) {
+    // A lane that no mass fills stays far above the ground.
+    for (int i = 0; i < MP; ++i) {
+        const bool full = i < M;
+        X[i] = full ? quad{x[i].x[0], x[i].y[0], x[i].z[0], w[i][0]} : quad{0, 0, 1000000, 0};
+        V[i] = full ? quad{v[i].x[0], v[i].y[0], v[i].z[0], 0} : quad{};
+    }
+    return;
+}
+if (job == 1) {
+    for (int i = 0; i < M; ++i) {
+        x[i].x[0] = X[i][0]; x[i].y[0] = X[i][1]; x[i].z[0] = X[i][2];
+        v[i].x[0] = V[i][0]; v[i].y[0] = V[i][1]; v[i].z[0] = V[i][2];
+    }
+    return;
+}
+
+const int* const starts = ends + 4 * ends_start[G];
+const quad* const at = job == 5 ? shifted_x : X;
+for (int s = 0; s < S; ++s) D[s] = at[partner[s]] - at[lower[s]];
+const real si = zero + sine[0], co = zero + cosine[0];
+for (int s = 0; s < SP; s += W) {
+    real* const d = (real*)(D + s);
+    const real* const k = P + s / W * coefficients;
+    const real q = ACTUATED ? breathing(k[1], k[2], k[3], si, co) : k[1];
+    real dx = d[0], dy = d[1], dz = d[2], pad = d[3];
+    transpose(dx, dy, dz, pad);
+    const real pull = spring_pull(squared_length(dx, dy, dz), k[0], q);
+    d[0] *= spread0(pull); d[1] *= spread1(pull); d[2] *= spread2(pull); d[3] *= spread3(pull);
+}
+for (int g = 0; g < G; ++g) {
+    quad f0 = {}, f1 = {}, f2 = {}, f3 = {};
+    for (int e = 4 * ends_start[g]; e < 4 * ends_start[g + 1]; e += 4) {
+        f0 -= D[ends[e]]; f1 -= D[ends[e + 1]]; f2 -= D[ends[e + 2]]; f3 -= D[ends[e + 3]];
+    }
+    for (int e = 4 * starts_start[g]; e < 4 * starts_start[g + 1]; e += 4) {
+        f0 += D[starts[e]]; f1 += D[starts[e + 1]]; f2 += D[starts[e + 2]];
+        f3 += D[starts[e + 3]];
+    }
+    FQ[4 * g] = f0; FQ[4 * g + 1] = f1; FQ[4 * g + 2] = f2; FQ[4 * g + 3] = f3;
+}
+for (int i = 0; i < MP; i += W) {
+    real* const xs = (real*)(X + i);
+    real* const vs = (real*)(V + i);
+    const real* const fs = (real*)(FQ + i);
+    Vec a = {xs[0], xs[1], xs[2]}, u = {vs[0], vs[1], vs[2]}, f = {fs[0], fs[1], fs[2]};
+    real iw = xs[3], vpad = vs[3], fpad = fs[3];
+    transpose(a.x, a.y, a.z, iw);
+    transpose(f.x, f.y, f.z, fpad);
+    if (job == 4) {
+        const Vec b = kick_acceleration(f, iw);
+        a.x += b.x * GRADIENT_SHIFT; a.y += b.y * GRADIENT_SHIFT; a.z += b.z * GRADIENT_SHIFT;
+        transpose(a.x, a.y, a.z, iw);
+        real* const ys = (real*)(shifted_x + i);
+        ys[0] = a.x; ys[1] = a.y; ys[2] = a.z; ys[3] = iw;
+        continue;
+    }
+    transpose(u.x, u.y, u.z, vpad);
+    Losses losses = {};
+    if (EULER) euler_step(a, u, f, iw, losses);
+    else {
+        if (!start) lose_before(u, iw, losses);
+        kick(u, f, iw, a.z, time, losses);
+        lose_after(u, iw, losses);
+        real rest = CHIN4 && last ? left[i / W] : zero;
+        drift(a, u, iw, substeps, rest, last, losses);
+        if (CHIN4 && !last) left[i / W] = rest;
+    }
+    vpad = zero;
+    transpose(a.x, a.y, a.z, iw);
+    transpose(u.x, u.y, u.z, vpad);
+    xs[0] = a.x; xs[1] = a.y; xs[2] = a.z; xs[3] = iw;
+    vs[0] = u.x; vs[1] = u.y; vs[2] = u.z; vs[3] = vpad;
+}
+"""
