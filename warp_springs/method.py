@@ -21,7 +21,7 @@ LEVELS = 12
 #: fastest vibrations are bounded, but wrong.
 AUTO_PART = 0.5
 #: Steps of the contact flow within one drift: no fewer, no more, if the caller does not choose.
-SUBSTEPS = (8, 64)
+SUBSTEPS = (16, 64)
 
 
 @dataclass(frozen=True)
