@@ -69,6 +69,10 @@ class Evaluator:
             wall_time=time.perf_counter() - started,
         )
 
+    def prepare(self, robots: Sequence[ws.Robot]) -> None:
+        """Load the kernels for such robots: a new machine compiles them first."""
+        self._simulate(robots, self.simulation.dt, self.simulation.precision)
+
     def second_look(self, robots: Sequence[ws.Robot], fitness: np.ndarray) -> SecondLook:
         """Repeat the trial at half the time step in float64.
 

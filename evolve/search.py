@@ -10,6 +10,7 @@ from evolve.evaluate import Evaluator
 from evolve.optimizers.base import Candidates, Individuals
 from evolve.scores import Scores
 from evolve.store import Store
+from evolve.streams import Role, Streams
 
 __all__ = ["Generation", "Search"]
 
@@ -38,6 +39,11 @@ class Search:
     def finished(self) -> bool:
         """Whether all generations of the configuration are done."""
         return self.optimizer.generation >= self.config.generations
+
+    def prepare(self) -> None:
+        """Load the kernels, so that the first step takes no longer than the others."""
+        genomes = self.encoding.random(self.config.population, Streams(0)(0, Role.INITIAL))
+        self.evaluator.prepare(self.encoding.express(genomes))
 
     def step(self) -> Generation:
         """Search one generation further."""

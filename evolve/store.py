@@ -14,18 +14,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evolve.errors import StoreError
 from evolve.optimizers.base import NOBODY, Candidates
 from evolve.scores import Scores
 
-__all__ = ["Lock", "Record", "Store", "StoreError", "Timing"]
+if TYPE_CHECKING:
+    from evolve.evaluate import SecondLook
+
+__all__ = ["Finalist", "Lock", "Record", "Store", "Timing"]
 
 APPLICATION_ID = 0x65766F6C
 """Marks the files of this program among all SQLite files ("evol")."""
@@ -68,10 +74,6 @@ CREATE TABLE optimizer (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT N
 """
 
 
-class StoreError(Exception):
-    """A record cannot be used; the message is one line that says which file and why."""
-
-
 @dataclass(frozen=True)
 class Timing:
     """How long the parts of a generation took [s]."""
@@ -92,6 +94,23 @@ class Record:
     """Shape (n,), float64; NaN = no fitness."""
     status: np.ndarray
     """Shape (n,), int64."""
+
+
+@dataclass(frozen=True)
+class Finalist:
+    """An individual that was looked at twice."""
+
+    id: int
+    generation: int
+    fitness: float
+    dt: float
+    """Step of the second look [s]."""
+    second_fitness: float
+    """Fitness at that step; NaN = none."""
+    kept: float
+    """Second fitness / fitness."""
+    survives: bool
+    """Whether enough of the fitness is kept."""
 
 
 class Lock:
@@ -150,13 +169,14 @@ class Store:
         """
         if not path.is_file():
             raise StoreError(f"there is no record {path}")
-        mode = "rw" if write else "ro"
+        # The last connection that may write tidies SQLite's log away, so even readers may.
+        mode = "rw" if write or os.access(path, os.W_OK) else "ro"
         uri = f"{path.resolve().as_uri()}?mode={mode}"
-        connection = sqlite3.connect(uri, uri=True, isolation_level=None)
+        connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=30.0)
         try:
             _check(connection, path, thoroughly=write)
-            if write:
-                connection.execute("PRAGMA synchronous = FULL")
+            connection.execute("PRAGMA synchronous = FULL")
+            connection.execute(f"PRAGMA query_only = {not write}")
         except BaseException:
             connection.close()
             raise
@@ -212,12 +232,10 @@ class Store:
             execute("DELETE FROM optimizer")
             executemany("INSERT INTO optimizer VALUES (?, ?, ?, ?)", map(_packed, state.items()))
 
-    def add_second_looks(self, ids: Iterable[int], dt: float, table: np.ndarray) -> None:
-        """Record second looks; the rows of `table` are (fitness, kept, survives), shape (n, 3)."""
-        rows = [
-            (int(i), dt, *map(float, row[:2]), int(row[2]))
-            for i, row in zip(ids, table, strict=True)
-        ]
+    def add_second_looks(self, ids: Iterable[int], look: SecondLook) -> None:
+        """Record what was seen at a second look; a further one replaces it."""
+        columns = (look.fitness.tolist(), look.kept.tolist(), look.survives.tolist())
+        rows = [(i, look.dt, *row) for i, *row in zip(ids, *columns, strict=True)]
         with self._transaction():
             self._connection.executemany(
                 "INSERT OR REPLACE INTO second_look VALUES (?, ?, ?, ?, ?)", rows
@@ -285,12 +303,20 @@ class Store:
             chosen.setdefault(self.genomes([individual])[0], individual)
         return list(chosen.values())
 
-    def second_looks(self) -> dict[int, tuple[float, float | None, float | None, bool]]:
-        """Id -> (dt, fitness, kept, survives) of everybody who was looked at twice."""
+    def finalists(self) -> list[Finalist]:
+        """Everybody who was looked at twice; the champion, if there is one, is the first.
+
+        Those who survive come before those who do not, the fittest first, of equals the older.
+        """
         rows = self._connection.execute(
-            "SELECT individual, dt, fitness, kept, survives FROM second_look"
+            "SELECT id, generation, individual.fitness, dt, second_look.fitness, kept, survives "
+            "FROM second_look JOIN individual ON id = individual "
+            "ORDER BY survives DESC, individual.fitness DESC, id"
         )
-        return {row[0]: (row[1], row[2], row[3], bool(row[4])) for row in rows}
+        return [
+            Finalist(*row[:4], *(np.nan if x is None else x for x in row[4:6]), bool(row[6]))
+            for row in rows
+        ]
 
     def totals(self) -> tuple[int, float, float]:
         """Spring evaluations, seconds of evaluation and seconds of the driver, of the whole run."""
@@ -341,7 +367,7 @@ def _packed(item: tuple[str, np.ndarray]) -> tuple[str, str, str, bytes]:
 def _has_tables(path: Path) -> bool:
     """Whether a file is a record, or anything else than one that was killed at its creation."""
     try:
-        with sqlite3.connect(path) as connection:
+        with closing(sqlite3.connect(path)) as connection:
             return bool(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
     except sqlite3.DatabaseError:
         return True

@@ -13,17 +13,14 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from evolve.config import RunConfig
+from evolve.errors import ConfigError
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-__all__ = ["ConfigError", "dump", "load", "parse", "parse_settings", "preset_names"]
-
-
-class ConfigError(ValueError):
-    """A configuration is not usable; the message is one line that says where and why."""
+__all__ = ["dump", "load", "parse", "parse_settings", "preset_names", "validate"]
 
 
 def preset_names() -> list[str]:
@@ -69,6 +66,11 @@ def parse(text: str, source: str, overrides: Mapping[str, Any] | None = None) ->
         raise ConfigError(f"{source} is not valid TOML: {error}") from None
     for key, value in (overrides or {}).items():
         _override(data, key, value)
+    return validate(data, source)
+
+
+def validate(data: Mapping[str, Any], source: str) -> RunConfig:
+    """Check a configuration given as nested tables. Raises ConfigError like `load`."""
     try:
         return RunConfig.model_validate(data)
     except ValidationError as error:

@@ -72,7 +72,7 @@ class Trial:
     """One robot stepped by the simulator's discrete algorithm.
 
     `contact_substeps` is the number of velocity-Verlet sub-steps of the vertical motion that a
-    mass near the ground takes within a step of `leapfrog`; `euler` ignores it.
+    mass near the ground takes within a drift; `euler` has no drift and ignores it.
 
     `margin` is the smallest relative distance of any stick-or-slip decision from its threshold.
     The outcome of friction jumps there: where the margin is of the order of rounding, two correct
@@ -90,8 +90,12 @@ class Trial:
         self.steps = 0
         self.margin = np.inf
         self._state = np.array(robot.velocities, dtype=np.float64)
-        self._advance = {"euler": self._euler, "leapfrog": self._leapfrog}[integrator]
-        self._is_synchronous = integrator == "euler"
+        # The step, the length of its drifts, and the part of its first kick that ends the last one.
+        self._advance, self._span, self._closing_kick = {
+            "euler": (self._euler, dt, None),
+            "leapfrog": (self._leapfrog, dt, dt / 2),
+            "chin4": (self._chin4, dt / 2, dt / 6),
+        }[integrator]
 
     def step(self):
         """Advance by dt."""
@@ -116,25 +120,26 @@ class Trial:
     def velocities(self):
         """Velocities at the same instant as the positions [m/s], shape (M, 3).
 
-        Leapfrog keeps them half a kick behind; the missing half is added to a copy here. A mass
-        in the ground feels the friction of that half step too, so that a stuck mass reports rest.
+        A step that kicks and drifts keeps them before the kick that would end it; it is added to
+        a copy here. A mass in the ground feels the friction of that kick too, so that a stuck
+        mass reports rest.
         """
-        velocities = self._state.copy()
-        if self._is_synchronous or self.steps == 0:
-            return velocities
-        half = self.dt / 2
-        velocities = self._dragged(self._damped(velocities, half), half)
-        velocities = self._kicked(velocities, half)
+        if self._closing_kick is None or self.steps == 0:
+            return self._state.copy()
+        velocities = self._dragged(self._damped(self._state, self._span / 2), self._span / 2)
+        velocities = self._kicked(velocities, self._spring_forces(), self._closing_kick)
         if self._friction == "coulomb":
-            impulse = self._normal_forces() / self.masses * half
-            self._rub(velocities, impulse)
+            self._rub(velocities, self._normal_forces() / self.masses * self._closing_kick)
         return velocities
 
-    # The parts of a step.
+    # What acts on a mass.
 
     @property
     def _friction(self):
         return None if self.scene.ground is None else self.scene.ground.friction
+
+    def _spring_forces(self):
+        return spring_forces(self.robot, self.positions, self.time)
 
     def _normal_forces(self):
         """Force of the ground on each mass [N], shape (M,)."""
@@ -180,16 +185,11 @@ class Trial:
                 keep = 1.0 - ground.kinetic_friction * normal[i] / horizontal
                 forces[i, XY] *= max(0.0, keep)
 
-    def _forces(self):
-        """Springs and weight [N], shape (M, 3)."""
-        weight = self.masses[:, None] * self.gravity
-        return spring_forces(self.robot, self.positions, self.time) + weight
-
     # The classroom method: symplectic Euler.
 
     def _euler(self):
         dt = self.dt
-        forces = self._forces()
+        forces = self._spring_forces() + self.masses[:, None] * self.gravity
         velocities = self._state
         if self._friction == "course":
             self._course_rule(forces, velocities)
@@ -202,53 +202,79 @@ class Trial:
         self._state = velocities
         self.positions = self.positions + velocities * dt
 
-    # Leapfrog: kick by the springs, drift with gravity and ground.
+    # Springs kick; in the drifts between, gravity and ground act. A kick that ends a step and the
+    # one that begins the next are one.
 
-    def _kicked(self, velocities, duration):
-        """`velocities` after the springs, and the weight that is not in the drift, acted."""
-        forces = self._forces()
+    def _leapfrog(self):
+        begins = self.steps == 0
+        self._lossy_kick(self._spring_forces(), self.dt / 2 if begins else self.dt, begins)
+        self._slide(self._fall())
+
+    def _chin4(self):
+        """Chin's 4A: the middle kick takes the forces a little further along the acceleration."""
+        dt, begins = self.dt, self.steps == 0
+        self._lossy_kick(self._spring_forces(), dt / 6 if begins else dt / 3, begins)
+        first = self._fall()
+        self._slide(first * 2 / 3)  # after a third of the step's kicks, two thirds of the friction
+
+        middle = self.time + dt / 2
+        forces = spring_forces(self.robot, self.positions, middle)
+        shift = self._with_weight(forces) / self.masses[:, None] * dt**2 / 24
+        forces = spring_forces(self.robot, self.positions + shift, middle)
+        self._lossy_kick(forces, dt * 2 / 3, begins=False)
+        second = self._fall()
+        self._slide(first / 3 + second)
+
+    def _with_weight(self, forces):
+        """`forces` and the weight, but for its vertical part where that belongs to the drift."""
+        weight = self.masses[:, None] * self.gravity
         if self.scene.ground is not None:
-            forces[:, Z] -= self.masses * self.gravity[Z]  # part of the drift
+            weight[:, Z] = 0.0
+        return forces + weight
+
+    def _kicked(self, velocities, forces, duration):
+        """`velocities` after `forces` and the weight acted for `duration`."""
+        forces = self._with_weight(forces)
         velocities = velocities.copy()
         if self._friction == "course":
             self._course_rule(forces, velocities)
         return velocities + forces / self.masses[:, None] * duration
 
-    def _leapfrog(self):
-        dt, half = self.dt, self.dt / 2
+    def _lossy_kick(self, forces, duration, begins):
+        """Kick between the losses of half the drift before, unless it begins all, and after."""
+        half = self._span / 2
         velocities = self._state
-        if self.steps == 0:
-            velocities = self._kicked(velocities, half)
-        else:
+        if not begins:
             velocities = self._dragged(self._damped(velocities, half), half)
-            velocities = self._kicked(velocities, dt)
-        velocities = self._damped(self._dragged(velocities, half), half)
-        if self.scene.ground is None:
-            self.positions = self.positions + velocities * dt
-        else:
-            impulse = self._fall(velocities)
-            if self._friction == "coulomb":
-                self._rub(velocities, impulse)
-            self.positions[:, XY] += velocities[:, XY] * dt
-        self._state = velocities
+        velocities = self._kicked(velocities, forces, duration)
+        self._state = self._damped(self._dragged(velocities, half), half)
 
-    def _fall(self, velocities):
-        """Vertical motion over a step, in place; the ground's impulse per mass [m/s], (M,)."""
-        dt, g = self.dt, self.gravity[Z]
+    def _slide(self, impulse):
+        """Horizontal drift, after the friction of a normal impulse per mass [m/s], (M,)."""
+        if self._friction == "coulomb":
+            self._rub(self._state, impulse)
+        self.positions[:, XY] += self._state[:, XY] * self._span
+
+    def _fall(self):
+        """Vertical drift; returns the ground's impulse per mass [m/s], (M,)."""
         impulse = np.zeros(len(self.masses))
+        if self.scene.ground is None:
+            self.positions[:, Z] += self._state[:, Z] * self._span
+            return impulse
+        g, span = self.gravity[Z], self._span
         for i, mass in enumerate(self.masses):
-            z, w = self.positions[i, Z], velocities[i, Z]
-            free = z + w * dt + g * dt**2 / 2
+            z, w = self.positions[i, Z], self._state[i, Z]
+            free = z + w * span + g * span**2 / 2
             if z < 0.0 or free < 0.0:
                 z, w, impulse[i] = self._contact(z, w, mass)
             else:
-                z, w = free, w + g * dt
-            self.positions[i, Z], velocities[i, Z] = z, w
+                z, w = free, w + g * span
+            self.positions[i, Z], self._state[i, Z] = z, w
         return impulse
 
     def _contact(self, z, w, mass):
         """Velocity-Verlet sub-steps of one mass under gravity and ground: z, w, impulse."""
-        g, h = self.gravity[Z], self.dt / self.contact_substeps
+        g, h = self.gravity[Z], self._span / self.contact_substeps
         push = self.scene.ground.stiffness / mass
         impulse = 0.0
         for _ in range(self.contact_substeps):

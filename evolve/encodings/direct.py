@@ -76,18 +76,20 @@ class DirectEncoding(ArrayGenomes):
         Each mutation changes a random choice of the four kinds of gene. Rest length, amplitude
         and stiffness are reflected at their bounds.
         """
-        n, springs = len(genomes), self.genome_shape[1]
+        n = len(genomes)
         in_region = rng.random(n) < self.settings.region_mutation
-        chosen = np.where(
-            in_region[:, None], self._balls(n, rng), self._scattered(n, rng)
-        )  # (n, S)
+        chosen = np.where(in_region[:, None], self._balls(n, rng), self._scattered(n, rng))
         kinds = rng.random((n, 4)) < 0.5
         kinds[np.arange(n), rng.integers(4, size=n)] = True
-        shift = rng.standard_normal((n, 4, springs), dtype=np.float32)
-        shift[in_region] = shift[in_region, :, :1]
-        shift *= np.float32(self.settings.mutation_step)
-        shift *= chosen[:, None, :] & kinds[:, :, None]
-        return _within_bounds(genomes + shift)
+        shared = rng.standard_normal((n, 4), dtype=np.float32)
+        # Few springs change: only their genes are shifted, as K rows of four.
+        rows, springs = np.nonzero(chosen)
+        shift = rng.standard_normal((len(rows), 4), dtype=np.float32)
+        shift = np.where(in_region[rows, None], shared[rows], shift) * kinds[rows]
+        genes = genomes[rows, :, springs] + np.float32(self.settings.mutation_step) * shift
+        mutants = genomes.copy()
+        mutants[rows, :, springs] = _within_bounds(genes)
+        return mutants
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Take every spring, with its four genes, from a[i] or from b[i]."""
@@ -144,7 +146,7 @@ class DirectEncoding(ArrayGenomes):
 
 
 def _within_bounds(genes: np.ndarray) -> np.ndarray:
-    """Bring genes back into [0, 1]: phases (row 2) go round, the others are reflected."""
+    """Bring genes (K, 4) back into [0, 1]: phases go round, the others are reflected."""
     folded = np.abs(genes - 2.0 * np.round(0.5 * genes))
     phase = genes[:, PHASE]
     folded[:, PHASE] = phase - np.floor(phase)

@@ -84,5 +84,12 @@ class GeneticAlgorithm(PopulationOptimizer):
 
 
 def _order(individuals: Individuals) -> np.ndarray:
-    """Indices that sort individuals, the best first; of equals, the older first."""
-    return np.lexsort((individuals.ids, -individuals.scores.worth))
+    """Indices that sort individuals, the best first; of equals, the older first.
+
+    Equal to the last bit means a copy: whoever repeats the fitness of an older one comes after
+    everybody else, so that one genome never fills the elite.
+    """
+    worth = individuals.scores.worth
+    order = np.lexsort((individuals.ids, -worth))
+    repeats = np.append(False, worth[order][1:] == worth[order][:-1])
+    return np.concatenate([order[~repeats], order[repeats]])

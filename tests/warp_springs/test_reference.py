@@ -88,7 +88,7 @@ def compare(batch, scene, integrator, precision="float64"):
     return np.array(position_errors), np.array(velocity_errors), min(margins)
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", "chin4", "euler"])
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 @settings(max_examples=7)
 @given(single=robots(), shared=robots())
@@ -103,7 +103,7 @@ def test_random_robots_follow_the_reference(scene, integrator, single, shared):
     assert velocity_errors.max() < 1e-10
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", "chin4", "euler"])
 @pytest.mark.parametrize("name", ["free flight", "everything"])
 @settings(max_examples=3)
 @given(batch=st.lists(robots(), min_size=7, max_size=7))
@@ -115,7 +115,7 @@ def test_single_precision_follows_the_reference(name, integrator, batch):
     assert np.median(velocity_errors) < 5e-5
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", "chin4", "euler"])
 def test_walker_follows_the_reference_across_landing_and_runs(walker, integrator):
     scene = SCENES["coulomb"]
     simulation = ws.Simulation(walker, scene, dt=DT, integrator=integrator)

@@ -1,0 +1,148 @@
+"""The report of a run: its plots as PNG files, its parameters and results as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from evolve.config import RunConfig
+from evolve.errors import RunError
+from evolve.fitness import UNITS
+from evolve.plots import dot_plot, figure, learning_curve
+from evolve.run import Run
+from evolve.store import Finalist, Record, Store
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+__all__ = ["clock", "describe", "draw", "metric", "results", "table", "verdict"]
+
+
+def draw(run: Run) -> list[Path]:
+    """Write learning_curve.png and dot_plot.png and return their paths.
+
+    Raises:
+        RunError: No generation is complete.
+    """
+    with run.read() as store:
+        record = store.record()
+    if not len(record.ids):
+        raise RunError(f"{run.directory} has no complete generation yet: there is nothing to draw")
+    paths = []
+    for name, plot in {"learning_curve": learning_curve, "dot_plot": dot_plot}.items():
+        page = figure()
+        ax = plot(page.subplots(), record, run.config.task.fitness)
+        ax.set_title(_title(run.config, record), loc="left", pad=32)
+        path = run.directory / f"{name}.png"
+        draft = path.with_suffix(".draft.png")
+        page.savefig(draft)
+        draft.replace(path)
+        paths.append(path)
+    return paths
+
+
+def verdict(finalist: Finalist, config: RunConfig) -> str:
+    """What a champion reaches, and whether it is to be believed, in one line."""
+    unit = UNITS[config.task.fitness]
+    if np.isnan(finalist.second_fitness):
+        second = "stopped at half the time step"
+    else:
+        second = f"{finalist.second_fitness:.3f} ({finalist.kept:.0%}) at half the time step"
+    judgement = "survives" if finalist.survives else "does NOT survive"
+    return (
+        f"champion #{finalist.id} of generation {finalist.generation}: "
+        f"{finalist.fitness:.3f} {unit}; {second}: {judgement}"
+    )
+
+
+def describe(config: RunConfig) -> Iterator[tuple[str, str]]:
+    """What a run does, in a few lines: (subject, words)."""
+    body = config.body.build()
+    yield (
+        "body",
+        f"{config.body.shape}: {body.n_masses} masses, {body.n_springs} springs, "
+        f"{body.mass:g} kg, diameter {body.diameter:.3g} m",
+    )
+    yield (
+        "search",
+        f"{config.optimizer.type} over {config.encoding.type} genomes, "
+        f"{config.population:,} x {config.generations:,} = {config.budget:,} evaluations, "
+        f"seed {config.seed}",
+    )
+    task, simulation, period = config.task, config.simulation, config.encoding.period
+    yield (
+        "trial",
+        f"{task.fitness} over {task.measure:g} cycles of {period:g} s after {task.settle:g} to "
+        f"settle; {simulation.integrator}, dt {simulation.dt * 1e3:g} ms, {simulation.precision}",
+    )
+
+
+def results(store: Store, config: RunConfig) -> Iterator[tuple[str, str]]:
+    """What came of a run: (subject, words)."""
+    record = store.record()
+    springs, evaluating, driving = store.totals()
+    yield "generations", f"{store.generations:,} of {config.generations:,}"
+    yield "evaluations", f"{len(record.ids):,}, {_stopped(record)}"
+    if np.isfinite(record.fitness).any():
+        best = int(np.nanargmax(record.fitness))
+        yield (
+            "best",
+            f"{record.fitness[best]:.4g} {UNITS[config.task.fitness]} "
+            f"(#{record.ids[best]}, generation {record.generations[best]})",
+        )
+    if finalists := store.finalists():
+        yield "verdict", verdict(finalists[0], config)
+    if evaluating:
+        yield "cost", f"{metric(springs)} spring evaluations in {clock(evaluating)}"
+        yield "speed", f"{metric(springs / evaluating)} springs/s"
+        yield "driver", f"{driving / (driving + evaluating):.1%} of the time"
+    yield "digest", store.digest()
+
+
+def table(run: Run) -> Table:
+    """Parameters and results of a run, for the terminal."""
+    from rich.table import Table
+
+    sheet = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+    sheet.add_column(style="dim", no_wrap=True)
+    sheet.add_column(overflow="fold")
+    with run.read() as store:
+        for subject, words in [*describe(run.config), *results(store, run.config)]:
+            sheet.add_row(subject, words)
+    return sheet
+
+
+def clock(seconds: float) -> str:
+    """A duration as m:ss or h:mm:ss."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def metric(number: float) -> str:
+    """A large number with a prefix: 1.02 G; a question mark for none."""
+    if np.isnan(number):
+        return "?"
+    for limit, prefix in ((1e12, "T"), (1e9, "G"), (1e6, "M")):
+        if number >= limit:
+            return f"{number / limit:.3g} {prefix}"
+    return f"{number:,.0f}"
+
+
+def _stopped(record: Record) -> str:
+    """How many robots were stopped, and why."""
+    import warp_springs as ws
+
+    codes, counts = np.unique(record.status[record.status != 0], return_counts=True)
+    why = ", ".join(f"{ws.Status(c).name} {n:,}" for c, n in zip(codes, counts, strict=True))
+    return f"{counts.sum():,} of them stopped" + (f" ({why})" if why else "")
+
+
+def _title(config: RunConfig, record: Record) -> str:
+    return (
+        f"{config.name}: {config.optimizer.type} over {config.encoding.type} genomes, "
+        f"seed {config.seed}, {len(record.ids):,} evaluations"
+    )

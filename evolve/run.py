@@ -1,0 +1,277 @@
+"""A run: a folder that holds a configuration, the record of every evaluation, and what they gave.
+
+What was decided lives in two files, `run.toml` and `run.sqlite`; everything else in the folder
+can be made again from them. `run.toml` appears whole or not at all and is what makes a folder a
+run, so a process may be killed at any moment, even before its first generation.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evolve.config import RunConfig
+from evolve.errors import RunError
+from evolve.evaluate import Evaluator
+from evolve.search import Generation, Search
+from evolve.store import Lock, Store, Timing
+from evolve.toml import dump, load, parse, validate
+
+__all__ = ["Progress", "Run"]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is, after each of its generations."""
+
+    generation: int
+    """How many are done."""
+    generations: int
+    """How many there will be."""
+    evaluations: int
+    failures: int
+    """Evaluations without fitness."""
+    best_id: int
+    best_fitness: float
+    median: float
+    """Of the fitness of this generation; NaN when nobody has one."""
+    springs_per_second: float
+    """Spring evaluations per second of evaluating, over the last generations [1/s]."""
+    elapsed: float
+    """Since this session began [s]."""
+    remaining: float
+    """Until the last generation, at the pace of the last generations [s]."""
+
+
+class Run:
+    """The folder of a run."""
+
+    def __init__(self, directory: Path, config: RunConfig) -> None:
+        self.directory = directory
+        self.config = config
+
+    @property
+    def record_path(self) -> Path:
+        """Where every evaluation is recorded."""
+        return self.directory / "run.sqlite"
+
+    @classmethod
+    def create(cls, config: RunConfig, directory: Path) -> Run:
+        """Make the folder of a new run.
+
+        Raises:
+            RunError: There is something in that place already.
+            StoreError: Another process is about to start a run there.
+        """
+        _refuse_occupied(directory)
+        directory.mkdir(parents=True, exist_ok=True)
+        run = cls(directory, config)
+        with run._locked():
+            _refuse_occupied(directory)  # another process may have been faster
+            run._write_config()
+        return run
+
+    @classmethod
+    def open(cls, directory: Path) -> Run:
+        """Open the folder of a run that was created before.
+
+        Raises:
+            RunError: It is not there.
+            ConfigError: Its run.toml is no longer a configuration.
+        """
+        path = directory / "run.toml"
+        if not directory.is_dir():
+            raise RunError(f"there is no folder {directory}")
+        if not path.is_file():
+            raise RunError(
+                f"{directory} holds no run (it has no run.toml); start one with "
+                f"evolve run PRESET --out {directory}"
+            )
+        return cls(directory, load(path))
+
+    def read(self) -> Store:
+        """Open the record for reading."""
+        return Store.open(self.record_path)
+
+    def change(self, generations: int | None = None, threads: int | None = None) -> None:
+        """Change what does not decide any bit of the record: its length, and the cores to use."""
+        data = self.config.model_dump()
+        if generations is not None:
+            data["generations"] = generations
+        if threads is not None:
+            data["simulation"]["threads"] = threads
+        changed = validate(data, str(self.directory / "run.toml"))
+        if changed != self.config:
+            with self._locked():
+                self.config = changed
+                self._write_config()
+
+    def evolve(
+        self,
+        watch: Callable[[Progress], None] = lambda progress: None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> bool:
+        """Search from where the record ends to the last generation.
+
+        Args:
+            watch: Told how far the run is, before the first step and after each generation.
+            should_stop: Asked before each generation.
+
+        Returns:
+            Whether the run is complete, rather than stopped.
+
+        Raises:
+            StoreError: Another process evolves this run, or its record is not usable.
+            RunError: run.toml was changed since the record was begun.
+        """
+        meta = {"config": dump(self.config), **_origin()}
+        with self._locked(), Store.create(self.record_path, meta, Evaluator.descriptors) as store:
+            self._check_unchanged(store)
+            search = Search(self.config)
+            search.restore(store)
+            watch(_Clock().progress(search, None))
+            search.prepare()
+            clock = _Clock()
+            while not search.finished:
+                if should_stop():
+                    return False
+                generation = search.step()
+                store.add_generation(
+                    generation.number,
+                    generation.candidates,
+                    search.encoding.to_bytes(generation.candidates.genomes),
+                    generation.scores,
+                    search.optimizer.state(),
+                    clock.lap(generation),
+                )
+                watch(clock.progress(search, generation))
+        return True
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Within, no other process starts, changes or evolves this run."""
+        lock = Lock(self.directory / "run.lock")
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def _check_unchanged(self, store: Store) -> None:
+        """Refuse to continue a record under another configuration."""
+        then = _decisive(parse(store.meta["config"], str(self.record_path)))
+        now = _decisive(self.config)
+        changes = [
+            f"{key} was {then.get(key)!r}, is {now.get(key)!r}"
+            for key in sorted(then.keys() | now.keys())
+            if then.get(key) != now.get(key)
+        ]
+        if changes:
+            raise RunError(
+                f"{self.directory / 'run.toml'} was changed since the run began: "
+                f"{'; '.join(changes)}; undo that, or start a new run from it"
+            )
+
+    def _write_config(self) -> None:
+        """Write run.toml, whole or not at all."""
+        origin = "".join(f"# {key}: {value}\n" for key, value in _origin().items())
+        text = f"# Repeat this run: evolve run {self.directory / 'run.toml'} --out NEW_FOLDER\n"
+        draft = self.directory / "run.toml.draft"
+        with draft.open("w", encoding="utf-8") as file:
+            file.write(f"{text}{origin}\n{dump(self.config)}")
+            file.flush()
+            os.fsync(file.fileno())
+        draft.replace(self.directory / "run.toml")
+
+
+class _Clock:
+    """Measures the pace of a session over its last generations."""
+
+    def __init__(self) -> None:
+        self._started = self._lap = time.perf_counter()
+        self._recent: deque[tuple[float, float, int]] = deque(maxlen=8)
+
+    def lap(self, generation: Generation) -> Timing:
+        """Times of the generation that ends now; recording the one before counts as driving."""
+        now = time.perf_counter()
+        whole, self._lap = now - self._lap, now
+        cost = int(generation.scores.spring_evaluations.sum())
+        self._recent.append((whole, generation.scores.wall_time, cost))
+        return Timing(generation.scores.wall_time, whole - generation.scores.wall_time)
+
+    def progress(self, search: Search, generation: Generation | None) -> Progress:
+        """How far the search is after a generation, or before the first."""
+        optimizer, total = search.optimizer, search.config.generations
+        fitness = [] if generation is None else generation.scores.fitness
+        fitness = np.asarray(fitness)[np.isfinite(fitness)]
+        whole, evaluating, cost = np.sum(self._recent, axis=0) if self._recent else (np.nan,) * 3
+        pace = whole / max(len(self._recent), 1)
+        return Progress(
+            generation=optimizer.generation,
+            generations=total,
+            evaluations=optimizer.evaluations,
+            failures=optimizer.failures,
+            best_id=optimizer.best_id,
+            best_fitness=optimizer.best_fitness,
+            median=float(np.median(fitness)) if len(fitness) else float("nan"),
+            springs_per_second=float(cost / evaluating),
+            elapsed=time.perf_counter() - self._started,
+            remaining=float(pace * left) if (left := total - optimizer.generation) > 0 else 0.0,
+        )
+
+
+def _refuse_occupied(directory: Path) -> None:
+    """Refuse a place that holds more than what a start cut short may have left."""
+    if not directory.exists():
+        return
+    if not directory.is_dir():
+        raise RunError(f"{directory} is a file; choose another place with --out")
+    names = {path.name for path in directory.iterdir()}
+    if "run.toml" in names:
+        raise RunError(
+            f"{directory} already holds a run; continue it with evolve resume {directory}, "
+            "or choose another place with --out"
+        )
+    if others := sorted(names - {"run.lock", "run.lock-journal", "run.toml.draft"}):
+        raise RunError(f"{directory} is not empty ({others[0]}); choose another place with --out")
+
+
+def _decisive(config: RunConfig) -> dict[str, Any]:
+    """What decides the bits of a record: dotted key -> value."""
+    left_out = {"name": True, "about": True, "generations": True, "simulation": {"threads"}}
+    flat: dict[str, Any] = {}
+    _flatten(json.loads(config.model_dump_json(exclude=left_out)), "", flat)
+    flat.pop("task.second_look")
+    return flat
+
+
+def _flatten(table: Mapping[str, Any], prefix: str, flat: dict[str, Any]) -> None:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            _flatten(value, f"{prefix}{key}.", flat)
+        else:
+            flat[prefix + key] = value
+
+
+def _origin() -> dict[str, str]:
+    """What made a run: versions and machine."""
+    packages = {name: _version(name) for name in ("warp-springs", "warp-lang", "numpy")}
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    return {**packages, "python": platform.python_version(), "machine": machine}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed as a package"

@@ -1,0 +1,217 @@
+from __future__ import annotations
+
+import os
+import pty
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+
+from evolve.toml import preset_names
+from tests.evolve.conftest import TINY, command, environment, flags, shell_in
+
+
+def words(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_help_is_fast_and_names_every_command(shell):
+    seconds = []
+    for _ in range(3):  # the first start may have to compile bytecode, others may be disturbed
+        started = time.perf_counter()
+        done = shell("--help")
+        seconds.append(time.perf_counter() - started)
+        assert done.returncode == 0
+    assert min(seconds) < 1.5
+    for name in ("presets", "run", "resume", "report", "export", "digest"):
+        assert name in done.stdout
+        detail = shell(name, "--help")
+        assert detail.returncode == 0 and len(detail.stdout) > 200
+
+
+def test_presets_are_listed_one_a_line(shell):
+    done = shell("presets")
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == preset_names()
+    assert all(re.search(r"  (fixed|evolving) body  +\w", line) for line in lines)
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    """What a run said, and the folder in which it left runs/cube."""
+    place = tmp_path_factory.mktemp("example")
+    done = shell_in(place)("run", "cube", "--seed", 5, "--threads", 1, *flags())
+    assert done.returncode == 0, done.stderr
+    return done, place
+
+
+@pytest.fixture
+def run_folder(example, tmp_path):
+    """A copy of that run, in the folder in which `shell` runs."""
+    return shutil.copytree(example[1] / "runs/cube", tmp_path / "runs/cube")
+
+
+def test_a_run_says_what_it_does_and_what_it_wrote(example):
+    done, place = example
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("cube  ") and "seed 5" in done.stdout
+    assert sum(line.startswith("generation ") for line in lines) == 4
+    assert "96 evaluations" in done.stdout and "springs/s" in done.stdout
+    verdict = r"champion #\d+ of generation \d: [\d.]+ body diameters per cycle; "
+    assert re.search(verdict, done.stdout)
+    written = [line.strip() for line in lines[lines.index("wrote") + 1 :]]
+    names = ["run.sqlite", "champion.usdc", "zoo.usdc", "zoo.png"]
+    names += ["learning_curve.png", "dot_plot.png"]
+    assert written == [f"runs/cube/{name}" for name in names]
+    assert all((place / path).stat().st_size > 0 for path in written)
+    assert "\x1b" not in done.stdout, "no colours where nobody sees them"
+
+
+def test_a_run_is_repeated_from_its_toml_and_made_longer(shell, run_folder):
+    first = shell("digest", "runs/cube")
+    assert re.fullmatch(r"[0-9a-f]{64}\n", first.stdout)
+    again = shell("run", "runs/cube/run.toml", "--out", "again", "--threads", 2)
+    assert again.returncode == 0, again.stderr
+    assert shell("digest", "again").stdout == first.stdout
+    longer = shell("resume", "again", "--generations", 5)
+    assert "generation 5/5" in longer.stdout
+    assert shell("digest", "again").stdout != first.stdout
+
+
+def test_a_run_is_never_overwritten(shell, run_folder):
+    refused = shell("run", "cube", *flags())
+    assert refused.returncode == 1
+    assert refused.stderr == (
+        "evolve: runs/cube already holds a run; continue it with evolve resume runs/cube, "
+        "or choose another place with --out\n"
+    )
+
+
+def test_a_report_draws_and_tells(shell, run_folder):
+    (run_folder / "dot_plot.png").unlink()
+    report = shell("report", "runs/cube")
+    assert report.returncode == 0, report.stderr
+    for subject in ("body", "search", "evaluations", "verdict", "digest"):
+        assert f"\n{subject}" in f"\n{report.stdout}"
+    assert report.stdout.endswith("runs/cube/dot_plot.png\n")
+    assert (run_folder / "dot_plot.png").exists()
+
+
+def test_an_export_shows_the_best_in_one_world(shell, run_folder):
+    (run_folder / "zoo.usdc").unlink()
+    export = shell("export", "runs/cube", "--best", 4)
+    assert export.returncode == 0, export.stderr
+    assert "champion #" in export.stdout and export.stdout.endswith("zoo.png\n")
+
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(run_folder / "zoo.usdc"))
+    custom = [prim.GetCustomData() for prim in stage.Traverse()]
+    custom = [data for data in custom if "individual" in data]
+    assert len(custom) == len({data["individual"] for data in custom}) == 4
+    fitness = [data["fitness"] for data in custom]
+    assert fitness == sorted(fitness, reverse=True)
+    assert all(data["seed"] == 5 and data["run"] == "cube" for data in custom)
+
+
+MISTAKES = [
+    (["run", "cub"], "there is no preset 'cub' (did you mean 'cube'?); presets are "),
+    (["run", "my.toml"], "there is no file my.toml"),
+    (["run", "cube", "--population", 0], "preset cube: population: input should be greater than"),
+    (
+        ["run", "cube", "--optimizer", "magic"],
+        "optimizer.type must be one of 'random'",
+    ),
+    (
+        ["run", "cube", "--set", "task.mesure=2"],
+        "unknown key task.mesure (did you mean",
+    ),
+    (["run", "cube", "--set", "x"], "--set takes KEY=VALUE"),
+    (["run", "cube", "--set", "simulation.device=tpu"], "device"),
+    (["resume", "nowhere"], "there is no folder nowhere"),
+    (["report", "nowhere"], "there is no folder nowhere"),
+    (["export", "nowhere"], "there is no folder nowhere"),
+    (["digest", "nowhere"], "there is no folder nowhere"),
+    (["export", ".", "--best", 0], "--best must be 1 to 100, not 0"),
+    (["digest", "."], ". holds no run (it has no run.toml)"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), MISTAKES, ids=lambda x: words(str(x))[:50])
+def test_a_mistake_costs_one_clear_line(shell, arguments, message):
+    done = shell(*arguments)
+    assert done.returncode == 1
+    assert done.stderr.startswith("evolve: ") and message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_command_line_without_sense_is_explained(shell):
+    for arguments in (["bogus"], ["run", "cube", "--sed", "3"], ["resume"], ["run", "--seed", "x"]):
+        done = shell(*arguments)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr and "--help" in done.stderr + done.stdout
+
+
+def test_a_broken_record_is_one_clear_line(shell, run_folder):
+    (run_folder / "run.sqlite").write_bytes(b"rubbish" * 1000)
+    for name in ("resume", "report", "export", "digest"):
+        done = shell(name, "runs/cube")
+        assert done.returncode == 1
+        assert done.stderr == (
+            "evolve: runs/cube/run.sqlite cannot be read: file is not a database\n"
+        )
+
+
+def test_ctrl_c_ends_at_a_generation_and_says_how_to_go_on(tmp_path):
+    arguments = command("run", "cube", *flags(TINY | {"generations": 100_000}))
+    process = subprocess.Popen(
+        arguments,
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    until = time.monotonic() + 60.0
+    record = tmp_path / "runs/cube/run.sqlite-wal"
+    while not (record.exists() and record.stat().st_size > 200_000):
+        assert time.monotonic() < until and process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == ""
+    assert output.endswith("stopped; continue with: evolve resume runs/cube\n")
+
+
+def test_a_terminal_sees_a_live_display(tmp_path):
+    leader, follower = pty.openpty()
+    process = subprocess.Popen(
+        command("run", "cube", *flags()),
+        cwd=tmp_path,
+        env=environment() | {"TERM": "xterm-256color"},
+        stdin=follower,
+        stdout=follower,
+        stderr=follower,
+    )
+    os.close(follower)
+    output = b""
+    while True:
+        try:
+            piece = os.read(leader, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not piece:
+            break
+        output += piece
+    os.close(leader)
+    assert process.wait(timeout=60) == 0
+    text = output.decode()
+    assert "\x1b[" in text, "colours and a display that moves"
+    seen = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text)
+    for piece in ("4/4 generations", "96 evaluations", "champion #", "wrote"):
+        assert piece in seen

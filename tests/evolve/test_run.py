@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from evolve.errors import RunError, StoreError
+from evolve.run import Run
+from evolve.search import Search
+from evolve.store import Lock, Store
+from evolve.toml import load
+from tests.evolve.conftest import TINY, command, environment, flags
+
+
+def digest(run: Run) -> str:
+    with run.read() as store:
+        return store.digest()
+
+
+def evolved(config, folder) -> Run:
+    run = Run.create(config, folder)
+    assert run.evolve()
+    return run
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Run:
+    """A tiny run that nobody interrupted; not to be changed."""
+    return evolved(load("cube", TINY), tmp_path_factory.mktemp("runs") / "tiny")
+
+
+def test_the_record_holds_what_the_search_saw(finished):
+    search = Search(finished.config)
+    with finished.read() as store:
+        for number in range(finished.config.generations):
+            seen = search.step()
+            assert seen.number == number
+            ids = seen.candidates.ids
+            np.testing.assert_array_equal(store.scores(ids).fitness, seen.scores.fitness)
+            blobs = search.encoding.to_bytes(seen.candidates.genomes)
+            assert store.genomes(ids) == blobs
+        record = store.record()
+    assert search.finished
+    assert len(record.ids) == finished.config.budget == search.optimizer.evaluations
+    assert np.nanmax(record.fitness) == search.optimizer.best_fitness
+
+
+def test_the_digest_does_not_depend_on_threads_or_folders(finished, tmp_path):
+    config = load("cube", TINY | {"simulation.threads": 2})
+    assert digest(evolved(config, tmp_path / "elsewhere")) == digest(finished)
+
+
+def test_another_seed_is_another_run(finished, tmp_path):
+    other = evolved(load("cube", TINY | {"seed": 2, "generations": 1}), tmp_path / "other")
+    assert digest(other) != digest(finished)
+
+
+@pytest.mark.parametrize("optimizer", ["genetic", "hill_climber", "random"])
+def test_a_run_stopped_after_every_generation_ends_the_same(optimizer, tmp_path):
+    config = load("cube", TINY | {"optimizer.type": optimizer})
+    whole = evolved(config, tmp_path / "whole")
+    pieces = Run.create(config, tmp_path / "pieces")
+    sessions = 0
+    while True:
+        told = []
+        # Each session stops when it has done one generation.
+        complete = pieces.evolve(told.append, lambda told=told: len(told) > 1)
+        sessions += 1
+        if complete:
+            break
+        pieces = Run.open(pieces.directory)
+    assert sessions == config.generations
+    assert digest(pieces) == digest(whole)
+
+
+def test_progress_is_told_after_every_generation(tmp_path, tiny):
+    told = []
+    Run.create(tiny, tmp_path / "run").evolve(told.append)
+    assert [p.generation for p in told] == [0, 1, 2, 3, 4]
+    assert [p.evaluations for p in told] == [0, 24, 48, 72, 96]
+    assert math.isnan(told[0].best_fitness) and math.isnan(told[0].remaining)
+    last = told[-1]
+    assert last.generations == 4 and last.failures == 0 and last.remaining == 0.0
+    assert last.best_fitness >= last.median > 0.0
+    assert last.springs_per_second > 1e6 and last.elapsed > 0.0
+    assert [p.best_fitness for p in told[1:]] == sorted(p.best_fitness for p in told[1:])
+
+
+def test_a_longer_run_begins_like_the_shorter_one(finished, tmp_path):
+    config = load("cube", TINY | {"generations": 2})
+    run = evolved(config, tmp_path / "run")
+    assert digest(run) != digest(finished)
+    run = Run.open(run.directory)
+    run.change(generations=4, threads=2)
+    assert Run.open(run.directory).config.generations == 4
+    run.evolve()
+    assert digest(run) == digest(finished)
+
+
+def test_a_changed_configuration_is_not_continued(tmp_path, tiny):
+    run = evolved(tiny, tmp_path / "run")
+    path = run.directory / "run.toml"
+    path.write_text(path.read_text().replace("tournament = 4", "tournament = 5"))
+    with pytest.raises(RunError, match=r"was changed .* optimizer.tournament was 4, is 5;"):
+        Run.open(run.directory).evolve()
+
+
+def test_nothing_is_overwritten(finished, tmp_path, tiny):
+    with pytest.raises(RunError, match=r"already holds a run; continue it with evolve resume"):
+        Run.create(tiny, finished.directory)
+    (tmp_path / "thesis.txt").write_text("precious")
+    with pytest.raises(RunError, match=r"is not empty \(thesis.txt\)"):
+        Run.create(tiny, tmp_path)
+    with pytest.raises(RunError, match=r"thesis.txt is a file"):
+        Run.create(tiny, tmp_path / "thesis.txt")
+    with pytest.raises(RunError, match=r"holds no run \(it has no run.toml\)"):
+        Run.open(tmp_path)
+    with pytest.raises(RunError, match=r"there is no folder .*nowhere"):
+        Run.open(tmp_path / "nowhere")
+
+
+def test_a_run_is_evolved_by_one_process_only(tmp_path, tiny):
+    run = Run.create(tiny, tmp_path / "run")
+    lock = Lock(run.directory / "run.lock")
+    program = "import sys; from evolve.cli import main; main(['resume', sys.argv[1]])"
+    other = subprocess.run(
+        [sys.executable, "-c", program, str(run.directory)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert other.returncode == 1
+    assert other.stderr == f"evolve: {run.directory} is being evolved by another process\n"
+    with pytest.raises(StoreError, match="by another process"):
+        run.evolve()
+    lock.release()
+    assert run.evolve()
+
+
+LONG = TINY | {"generations": 14, "population": 64}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory) -> Run:
+    return evolved(load("cube", LONG), tmp_path_factory.mktemp("runs") / "undisturbed")
+
+
+@pytest.mark.parametrize("moment", range(4))
+def test_sigkill_at_a_random_moment_changes_nothing(undisturbed, moment, tmp_path):
+    # Real processes and real kills: the first between the making of the folder and the end of the
+    # first generation, the others whenever; the last one possibly while the exports are written.
+    folder = tmp_path / "run"
+    rng = np.random.Generator(np.random.Philox([moment, os.getpid()]))
+    arguments = command("run", "cube", *flags(LONG), "--out", folder)
+    kills = 0
+    for _ in range(3):
+        process = subprocess.Popen(
+            arguments, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        wait_for_folder(folder, process)
+        time.sleep(rng.uniform(0.0, 0.05) if not kills and moment == 0 else rng.uniform(0.0, 1.2))
+        process.send_signal(signal.SIGKILL)
+        output = process.communicate()[0].decode()
+        kills += process.returncode == -signal.SIGKILL
+        assert process.returncode in (0, -signal.SIGKILL), output
+        arguments = command("resume", folder)
+    last = subprocess.run(arguments, env=environment(), capture_output=True, text=True, check=False)
+    assert last.returncode == 0, last.stderr
+    assert kills
+    assert digest(Run.open(folder)) == digest(undisturbed)
+    names = {path.name for path in folder.iterdir()}
+    expected = {"champion.usdc", "zoo.usdc", "zoo.png", "learning_curve.png", "dot_plot.png"}
+    assert expected <= names
+    with Store.open(folder / "run.sqlite") as store:
+        assert len(store.finalists()) == 9
+
+
+def wait_for_folder(folder, process) -> None:
+    """Wait until there is something to kill: before that a run has not begun."""
+    until = time.monotonic() + 60.0
+    while not (folder / "run.toml").exists() and process.poll() is None:
+        assert time.monotonic() < until
+        time.sleep(0.001)
