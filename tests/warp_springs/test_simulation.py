@@ -245,10 +245,10 @@ def test_robots_must_be_robots(cube):
 
 
 def test_contact_substeps_are_reported_and_chosen(cube):
-    light, heavy = cube.replace(masses=0.01), cube.replace(masses=10.0)
+    light, heavy = cube.replace(masses=1e-4), cube.replace(masses=10.0)
     chosen = ws.Simulation([light, cube, heavy], ws.Scene(), dt=DT).contact_substeps
     assert chosen.shape == (3,)
-    assert chosen[0] > chosen[1] > chosen[2] >= 1
+    assert chosen[0] > chosen[1] == chosen[2] > 1
     fixed = ws.Simulation([light, heavy], ws.Scene(), dt=DT, contact_substeps=4)
     assert np.array_equal(fixed.contact_substeps, [4, 4])
 
