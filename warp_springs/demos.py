@@ -35,7 +35,7 @@ class Demo:
     robots: Callable[[], Sequence[Robot]]
     scene: Scene
     duration: float
-    dt: float = 1e-4
+    dt: float = 5e-4
 
     def run(self, progress: Callable[[float], None] | None = None) -> Result:
         """Simulate it, with all frames and energies."""
@@ -58,7 +58,7 @@ class Demo:
             **{f"scene {key}": value for key, value in asdict(self.scene).items()},
             "dt": f"{self.dt:g} s",
             "duration": f"{self.duration:g} s",
-            "integrator": "leapfrog",
+            "integrator": "chin4",
             "precision": "float64",
         }
 

@@ -14,7 +14,7 @@ from warp_springs.stability import Limits, Status, certainly_unstable, stable_st
 __all__ = ["AUTO_DT", "LEVELS", "Method"]
 
 #: The step of a run with ``dt="auto"`` [s]; each robot takes it, or a power of two fewer.
-AUTO_DT = 1e-3
+AUTO_DT = 5e-4
 #: Halvings of the step that ``dt="auto"`` may choose.
 LEVELS = 12
 #: The part of the largest stable step that ``dt="auto"`` stays within: at the limit itself the

@@ -25,9 +25,9 @@ class Result:
     Attributes:
         robots: The N robots as they were given to the simulation.
         scene: Their world.
-        dt: Step [s].
+        dt: Step of the run [s]; with ``dt="auto"`` a robot may take shorter ones.
         precision: ``"float64"`` or ``"float32"``.
-        integrator: ``"leapfrog"`` or ``"euler"``.
+        integrator: ``"chin4"``, ``"leapfrog"`` or ``"euler"``.
         device: Where the run took place.
         start_time: Time at the start of this run [s].
         end_time: Time at its end [s].

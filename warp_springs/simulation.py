@@ -31,14 +31,15 @@ class Simulation:
     Args:
         robots: A ``Robot``, a sequence of them, or ``Variants`` of one body.
         scene: The world, the same for all; ``Scene()`` by default.
-        dt: Step [s], or ``"auto"``: a millisecond, halved for each robot until it is half of
+        dt: Step [s]; or ``"auto"``, half a millisecond, halved for each robot until it is half of
             ``ws.stable_dt`` or less, so that one stiff robot does not slow a thousand.
         device: ``"cpu"``.
         precision: ``"float64"``, or ``"float32"`` for about twice the speed.
-        integrator: ``"leapfrog"`` (kick - drift - kick, second order; gravity and the ground are
-            sub-cycled in the drift) or ``"euler"`` (symplectic Euler, the classroom's method).
-        contact_substeps: Steps of the contact flow within a leapfrog step; by default chosen for
-            each robot from the ground's stiffness, its lightest mass and dt.
+        integrator: ``"chin4"`` (fourth order, three evaluations of the springs a step),
+            ``"leapfrog"`` (second order, one), or ``"euler"`` (symplectic Euler, the classroom's
+            method). With the first two, gravity and the ground are sub-cycled in the drifts.
+        contact_substeps: Steps of the contact flow within a drift; by default chosen for each robot
+            from the ground's stiffness, its lightest mass and the step.
         threads: CPU threads, by default as many as this process may use.
         limits: What stops a robot; ``Limits()`` by default.
 
@@ -53,11 +54,11 @@ class Simulation:
         self,
         robots: Robot | Sequence[Robot],
         scene: Scene | None = None,
-        dt: float | Literal["auto"] = 1e-4,
+        dt: float | Literal["auto"] = "auto",
         *,
         device: str = "cpu",
         precision: Literal["float64", "float32"] = "float64",
-        integrator: Literal["chin4", "leapfrog", "euler"] = "leapfrog",
+        integrator: Literal["chin4", "leapfrog", "euler"] = "chin4",
         contact_substeps: int | None = None,
         threads: int | None = None,
         limits: Limits | None = None,

@@ -182,7 +182,7 @@ def test_status_is_an_integer_array_of_a_truthy_enum():
 
 def test_stopped_robot_rests_where_it_was_last_good():
     bad = garbage()["too stiff together"]
-    simulation = ws.Simulation(bad, ws.Scene(), dt=DT)
+    simulation = ws.Simulation(bad, ws.Scene(), dt=DT, integrator="leapfrog")
     result = simulation.run(DURATION, fps=1 / DT)
     assert result.status[0] != ws.Status.OK
     positions = result.positions(0)
@@ -203,7 +203,7 @@ def test_exploded_at_the_end_of_a_run_is_stopped_in_this_run_and_the_next():
     # Also when the run ends between two checks: nothing of the exploded pose is shown.
     bad = garbage()["too stiff together"]
     for steps in range(1, 64):
-        simulation = ws.Simulation(bad, ws.Scene(), dt=DT)
+        simulation = ws.Simulation(bad, ws.Scene(), dt=DT, integrator="leapfrog")
         first = simulation.run(steps * DT)
         if first.status[0] != ws.Status.OK:
             break
@@ -237,5 +237,5 @@ def test_limits_refuse_nonsense(field, value):
 def test_spring_evaluations_leave_out_stopped_robots():
     bad, good = garbage()["one mass at 1e300 m/s"], cube()
     steps = round(DURATION / DT)
-    both = ws.Simulation([bad, good], ws.Scene(), dt=DT).run(DURATION)
+    both = ws.Simulation([bad, good], ws.Scene(), dt=DT, integrator="leapfrog").run(DURATION)
     assert both.spring_evaluations == good.n_springs * steps

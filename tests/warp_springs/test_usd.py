@@ -127,7 +127,7 @@ def test_layer_says_how_it_was_simulated(stage, exported):
     said = stage.GetRootLayer().customLayerData["warp_springs"]
     assert said["version"] == ws.__version__
     assert said["dt"] == exported[1].dt
-    assert said["integrator"] == "leapfrog"
+    assert said["integrator"] == exported[1].integrator
     assert list(said["scene"]["gravity"]) == [0.0, 0.0, -9.81]
     assert said["scene"]["ground"]["stiffness"] == 1e5
     assert said["endTime"] == pytest.approx(0.5, abs=1e-4)
