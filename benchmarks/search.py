@@ -90,7 +90,7 @@ def run(options: Options, optimizer: str, seed: int) -> Outcome:
         seed=seed,
         evaluations=search.optimizer.evaluations,
         best=float(fitness[champion]),
-        again=float(look.fitness[champion]),
+        again=float(look.halved[champion]),
         survives=bool(look.survives[champion]),
         seconds=time.perf_counter() - started,
         springs_per_second=cost / simulating,

@@ -145,8 +145,9 @@ class Export:
     """Simulate the best robots of a run again and write them as animations.
 
     Writes champion.usdc, zoo.usdc with the best different individuals side by side, and zoo.png to
-    the folder of the run. Each of them is also simulated at half the time step in float64; the
-    champion is the fittest who keeps its fitness there.
+    the folder of the run. The best are first simulated again, at half the time step in float64 and
+    from perturbed starts; the champion is the fittest who keeps its fitness there, and whoever
+    does not comes after all who do.
     """
 
     directory: Folder
@@ -164,8 +165,8 @@ class Export:
             raise RunError(f"--best must be 1 to 100, not {self.best}")
         run = RunFolder.open(self.directory)
         ws.quiet()
-        champion, paths = export(run, self.best)
-        print(verdict(champion, run.config))
+        finalists, paths = export(run, self.best)
+        print(verdict(finalists, run.config))
         _print_written(paths)
         return 0
 
@@ -220,9 +221,9 @@ def _finish(run: runs.Run, console: Console) -> None:
     from evolve.report import draw, results, verdict
 
     with console.status("looking twice at the best, writing animations and plots"):
-        champion, animations = export(run)
+        finalists, animations = export(run)
         plots = draw(run)
-    console.print(f"[bold]{verdict(champion, run.config)}[/]", highlight=False, soft_wrap=True)
+    console.print(f"[bold]{verdict(finalists, run.config)}[/]", highlight=False, soft_wrap=True)
     with run.read() as store:
         facts = dict(results(store, run.config))
     print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")

@@ -16,7 +16,17 @@ if TYPE_CHECKING:
     from evolve.encodings import Encoding
     from evolve.optimizers import Optimizer
 
-__all__ = ["BODIES", "RunConfig", "SceneConfig", "SimulationConfig", "TaskConfig"]
+__all__ = [
+    "BODIES",
+    "RunConfig",
+    "SceneConfig",
+    "SecondLookConfig",
+    "SimulationConfig",
+    "TaskConfig",
+]
+
+LONGEST_AUTO_STEP = 1e-3
+"""With dt = "auto" no robot takes a longer step [s]."""
 
 
 class Section(BaseModel):
@@ -150,13 +160,43 @@ class SceneConfig(Section):
 class SimulationConfig(Section):
     """How motion is computed."""
 
-    dt: float = Field(5e-4, gt=0.0)
-    """Time step [s]."""
+    dt: float | Literal["auto"] = 5e-4
+    """Time step [s], or "auto": for each robot a millisecond, halved until it is stable."""
     precision: Literal["float64", "float32"] = "float64"
-    integrator: Literal["leapfrog", "euler"] = "leapfrog"
+    integrator: Literal["chin4", "leapfrog", "euler"] = "leapfrog"
     device: str = "cpu"
     threads: int | None = Field(None, ge=1)
     """Processor cores to use, all when left out. The results do not depend on it."""
+
+    @field_validator("dt", mode="before")
+    @classmethod
+    def _is_a_step(cls, value: Any) -> Any:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if value != "auto" and not (number and value > 0.0):
+            raise ValueError("expected a number of seconds above 0, or 'auto'")
+        return value
+
+
+class SecondLookConfig(Section):
+    """How the best are simulated again before one of them is crowned."""
+
+    threshold: float = Field(0.8, ge=0.0)
+    """Share of its fitness that a champion must keep, both at half the time step in float64 and
+    from perturbed starts."""
+    candidates: int = Field(32, ge=1)
+    """How many of the best different individuals are looked at."""
+    trials: int = Field(16, ge=1)
+    """Perturbed starts of each candidate."""
+    quantile: float = Field(0.5, ge=0.0, le=1.0)
+    """Which of its perturbed trials counts: 0 the worst, 0.5 the median, 1 the best."""
+    position: float = Field(0.01, ge=0.0)
+    """Standard deviation of the displacement of each mass along x, y and z [shortest springs]."""
+    velocity: float = Field(0.01, ge=0.0)
+    """Standard deviation of the velocity of each mass along x, y and z [m/s]."""
+    rotation: float = Field(0.1, ge=0.0)
+    """Largest turn about the vertical, either way [rad]."""
+    height: float = Field(0.01, ge=0.0)
+    """Largest lift [shortest springs]."""
 
 
 class TaskConfig(Section):
@@ -167,8 +207,14 @@ class TaskConfig(Section):
     """How long they move before they are measured [cycles]."""
     measure: float = Field(4.0, gt=0.0)
     """How long they are measured [cycles]."""
-    second_look: float = Field(0.8, ge=0.0)
-    """Share of its fitness that a champion must keep at half the time step in float64."""
+    second_look: SecondLookConfig = SecondLookConfig()
+
+    @field_validator("second_look", mode="before")
+    @classmethod
+    def _is_a_table(cls, value: Any) -> Any:
+        if isinstance(value, (int, float)):
+            raise ValueError("expected a table; the share to keep is task.second_look.threshold")
+        return value
 
 
 def _choice(models: Any, key: str) -> Any:
@@ -206,9 +252,11 @@ class RunConfig(Section):
 
     @model_validator(mode="after")
     def _step_fits(self) -> RunConfig:
-        if self.simulation.dt > self.encoding.period / 10:
+        dt = self.simulation.dt
+        longest = LONGEST_AUTO_STEP if dt == "auto" else dt
+        if longest > self.encoding.period / 10:
             raise ValueError(
-                f"simulation.dt = {self.simulation.dt:g} s is too long for cycles of "
+                f"simulation.dt = {longest:g} s is too long for cycles of "
                 f"{self.encoding.period:g} s: at most a tenth of encoding.period"
             )
         return self

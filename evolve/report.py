@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from evolve.config import RunConfig
+from evolve.config import RunConfig, SecondLookConfig
 from evolve.errors import RunError
 from evolve.fitness import UNITS
 from evolve.plots import dot_plot, figure, learning_curve
@@ -18,7 +18,7 @@ from evolve.store import Finalist, Record, Store
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["clock", "describe", "draw", "metric", "results", "table", "verdict"]
+__all__ = ["clock", "demotions", "describe", "draw", "metric", "results", "table", "verdict"]
 
 
 def draw(run: Run) -> list[Path]:
@@ -44,17 +44,36 @@ def draw(run: Run) -> list[Path]:
     return paths
 
 
-def verdict(finalist: Finalist, config: RunConfig) -> str:
-    """What a champion reaches, and whether it is to be believed, in one line."""
-    unit = UNITS[config.task.fitness]
-    if np.isnan(finalist.second_fitness):
-        second = "stopped at half the time step"
-    else:
-        second = f"{finalist.second_fitness:.3f} ({finalist.kept:.0%}) at half the time step"
-    judgement = "survives" if finalist.survives else "does NOT survive"
+def verdict(finalists: Sequence[Finalist], config: RunConfig) -> str:
+    """Who is the champion, and what is left of its fitness at the second look, in one line.
+
+    Args:
+        finalists: Everybody who was looked at twice, survivors first, the fittest first.
+        config: Of their run.
+    """
+    first = finalists[0]
+    who = f"#{first.id} of generation {first.generation}"
+    figures = f"{first.fitness:.3f} {UNITS[config.task.fitness]}; {_second_look(first)}"
+    if first.survives:
+        return f"champion {who}: {figures}: survives"
+    count = len(finalists)
+    nobody = f"none of the {count} best survives" if count > 1 else "the best does NOT survive"
+    return f"no champion: {nobody} the second look; the fittest, {who}: {figures}"
+
+
+def demotions(finalists: Sequence[Finalist]) -> str:
+    """How many survive, and who lost the crown for not surviving."""
+    survivors = [f for f in finalists if f.survives]
+    words = f"{len(survivors)} of {len(finalists)} survive"
+    if not survivors:
+        return words
+    demoted = [f for f in finalists if not f.survives and f.fitness > survivors[0].fitness]
+    if not demoted:
+        return f"{words}; nobody fitter than the champion was demoted"
+    first = demoted[0]
     return (
-        f"champion #{finalist.id} of generation {finalist.generation}: "
-        f"{finalist.fitness:.3f} {unit}; {second}: {judgement}"
+        f"{words}; {len(demoted)} fitter than the champion demoted, the fittest "
+        f"#{first.id}: {first.fitness:.3f}; {_second_look(first)}"
     )
 
 
@@ -73,10 +92,17 @@ def describe(config: RunConfig) -> Iterator[tuple[str, str]]:
         f"seed {config.seed}",
     )
     task, simulation, period = config.task, config.simulation, config.encoding.period
+    step = "auto" if simulation.dt == "auto" else f"{simulation.dt * 1e3:g} ms"
     yield (
         "trial",
         f"{task.fitness} over {task.measure:g} cycles of {period:g} s after {task.settle:g} to "
-        f"settle; {simulation.integrator}, dt {simulation.dt * 1e3:g} ms, {simulation.precision}",
+        f"settle; {simulation.integrator}, dt {step}, {simulation.precision}",
+    )
+    look = task.second_look
+    yield (
+        "crown",
+        f"to the fittest of the {look.candidates} best that keeps {look.threshold:.0%} at half "
+        f"the time step in float64 and {_of_trials(look)}",
     )
 
 
@@ -94,7 +120,8 @@ def results(store: Store, config: RunConfig) -> Iterator[tuple[str, str]]:
             f"(#{record.ids[best]}, generation {record.generations[best]})",
         )
     if finalists := store.finalists():
-        yield "verdict", verdict(finalists[0], config)
+        yield "verdict", verdict(finalists, config)
+        yield "second look", demotions(finalists)
     if evaluating:
         yield "cost", f"{metric(springs)} spring evaluations in {clock(evaluating)}"
         yield "speed", f"{metric(springs / evaluating)} springs/s"
@@ -139,6 +166,22 @@ def _stopped(record: Record) -> str:
     codes, counts = np.unique(record.status[record.status != 0], return_counts=True)
     why = ", ".join(f"{ws.Status(c).name} {n:,}" for c, n in zip(codes, counts, strict=True))
     return f"{counts.sum():,} of them stopped" + (f" ({why})" if why else "")
+
+
+def _second_look(finalist: Finalist) -> str:
+    """Both figures of the second look."""
+
+    def figure(fitness: float, kept: float) -> str:
+        return "stopped" if np.isnan(fitness) else f"{fitness:.3f} ({kept:.0%})"
+
+    halved = figure(finalist.halved, finalist.halved_kept)
+    perturbed = figure(finalist.perturbed, finalist.perturbed_kept)
+    return f"{halved} at half the time step, {perturbed} from perturbed starts"
+
+
+def _of_trials(look: SecondLookConfig) -> str:
+    which = "the median" if look.quantile == 0.5 else f"the {look.quantile:g} quantile"
+    return f"in {which} of {look.trials} perturbed starts"
 
 
 def _title(config: RunConfig, record: Record) -> str:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,13 +23,18 @@ from typing import Any
 import numpy as np
 
 from evolve.config import RunConfig
-from evolve.errors import RunError
+from evolve.errors import RunError, StoreError
 from evolve.evaluate import Evaluator
+from evolve.lock import Lock
 from evolve.search import Generation, Search
-from evolve.store import Lock, Store, Timing
+from evolve.store import Store, Timing
 from evolve.toml import dump, load, parse, validate
 
 __all__ = ["Progress", "Run"]
+
+RECORD = "run.sqlite"
+LEFTOVERS = (".*.part", ".usd-*")
+"""What a process that is killed while it draws leaves beside the files of the run."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +70,7 @@ class Run:
     @property
     def record_path(self) -> Path:
         """Where every evaluation is recorded."""
-        return self.directory / "run.sqlite"
+        return self.directory / RECORD
 
     @classmethod
     def create(cls, config: RunConfig, directory: Path) -> Run:
@@ -89,6 +95,7 @@ class Run:
         Raises:
             RunError: It is not there.
             ConfigError: Its run.toml is no longer a configuration.
+            StoreError: Its record has another format.
         """
         path = directory / "run.toml"
         if not directory.is_dir():
@@ -98,6 +105,8 @@ class Run:
                 f"{directory} holds no run (it has no run.toml); start one with "
                 f"evolve run PRESET --out {directory}"
             )
+        # Older records come with older configurations; it is the record that cannot be mended.
+        Store.check_format(directory / RECORD)
         return cls(directory, load(path))
 
     def read(self) -> Store:
@@ -138,6 +147,8 @@ class Run:
         meta = {"config": dump(self.config), **_origin()}
         with self._locked(), Store.create(self.record_path, meta, Evaluator.descriptors) as store:
             self._check_unchanged(store)
+            with suppress(StoreError), self.exporting():
+                pass  # entering it tidies up, unless somebody is at work there
             search = Search(self.config)
             search.restore(store)
             watch(_Clock().progress(search, None))
@@ -157,6 +168,23 @@ class Run:
                 )
                 watch(clock.progress(search, generation))
         return True
+
+    @contextmanager
+    def exporting(self) -> Iterator[None]:
+        """Within, no other process exports this run; what a killed one left is removed.
+
+        A run may be exported while it is evolved.
+
+        Raises:
+            StoreError: Another process exports it.
+        """
+        lock = Lock(self.directory / "export.lock", "exported")
+        try:
+            for path in sorted(p for pattern in LEFTOVERS for p in self.directory.glob(pattern)):
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            yield
+        finally:
+            lock.release()
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
@@ -248,10 +276,15 @@ def _refuse_occupied(directory: Path) -> None:
 
 def _decisive(config: RunConfig) -> dict[str, Any]:
     """What decides the bits of a record: dotted key -> value."""
-    left_out = {"name": True, "about": True, "generations": True, "simulation": {"threads"}}
+    left_out = {
+        "name": True,
+        "about": True,
+        "generations": True,
+        "simulation": {"threads"},
+        "task": {"second_look"},
+    }
     flat: dict[str, Any] = {}
     _flatten(json.loads(config.model_dump_json(exclude=left_out)), "", flat)
-    flat.pop("task.second_look")
     return flat
 
 

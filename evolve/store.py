@@ -17,7 +17,7 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,13 +29,13 @@ from evolve.optimizers.base import NOBODY, Candidates
 from evolve.scores import Scores
 
 if TYPE_CHECKING:
-    from evolve.evaluate import SecondLook
+    from evolve.second_look import SecondLook
 
-__all__ = ["Finalist", "Lock", "Record", "Store", "Timing"]
+__all__ = ["Finalist", "Record", "Store", "Timing"]
 
 APPLICATION_ID = 0x65766F6C
 """Marks the files of this program among all SQLite files ("evol")."""
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 SCHEMA = """
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -64,10 +64,12 @@ CREATE TABLE parent (
 CREATE TABLE descriptor (individual INTEGER PRIMARY KEY REFERENCES individual (id){columns});
 CREATE TABLE second_look (
     individual INTEGER PRIMARY KEY REFERENCES individual (id),
-    dt REAL NOT NULL,                     -- step [s]
-    fitness REAL,                         -- at this step
-    kept REAL,                            -- this fitness / first fitness
-    survives INTEGER NOT NULL             -- 1: enough is left
+    dt REAL NOT NULL,                     -- half the first step [s]
+    halved REAL,                          -- fitness at this step in float64
+    halved_kept REAL,                     -- that / first fitness
+    perturbed REAL,                       -- quantile of the fitness from perturbed starts
+    perturbed_kept REAL,                  -- that / first fitness
+    survives INTEGER NOT NULL             -- 1: enough is left of both
 );
 CREATE TABLE optimizer (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL,
     data BLOB NOT NULL) WITHOUT ROWID;
@@ -104,33 +106,17 @@ class Finalist:
     generation: int
     fitness: float
     dt: float
-    """Step of the second look [s]."""
-    second_fitness: float
-    """Fitness at that step; NaN = none."""
-    kept: float
-    """Second fitness / fitness."""
+    """Half the step that it took at first [s]."""
+    halved: float
+    """Fitness at that step in float64; NaN = none."""
+    halved_kept: float
+    """That fitness / fitness."""
+    perturbed: float
+    """Quantile of the fitness from perturbed starts; NaN = none."""
+    perturbed_kept: float
+    """That fitness / fitness."""
     survives: bool
-    """Whether enough of the fitness is kept."""
-
-
-class Lock:
-    """Keeps a second process from writing to the same run; gone when its process is gone.
-
-    It is the exclusive lock of an empty SQLite file: the operating system takes it back from a
-    killed process, and readers of the record are not disturbed.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._connection = sqlite3.connect(path, timeout=0.0, isolation_level=None)
-        try:
-            self._connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
-            self._connection.close()
-            raise StoreError(f"{path.parent} is being evolved by another process") from None
-
-    def release(self) -> None:
-        """Let others write."""
-        self._connection.close()
+    """Whether enough is left of both."""
 
 
 class Store:
@@ -165,7 +151,7 @@ class Store:
 
         Raises:
             StoreError: The file does not exist, is broken, or was not written by this program or
-                was written by a newer one.
+                was written by a version with another format.
         """
         if not path.is_file():
             raise StoreError(f"there is no record {path}")
@@ -181,6 +167,19 @@ class Store:
             connection.close()
             raise
         return cls(connection, path)
+
+    @staticmethod
+    def check_format(path: Path) -> None:
+        """Refuse a record of another format; whatever else is there, even nothing, is fine.
+
+        Raises:
+            StoreError: It was written by a version of this program with another format.
+        """
+        if path.is_file():
+            with suppress(sqlite3.DatabaseError), closing(sqlite3.connect(path)) as connection:
+                application, version = _marks(connection)
+                if application == APPLICATION_ID:
+                    _check_version(path, version)
 
     def close(self) -> None:
         """Close the file; SQLite then folds its log into it."""
@@ -232,13 +231,17 @@ class Store:
             execute("DELETE FROM optimizer")
             executemany("INSERT INTO optimizer VALUES (?, ?, ?, ?)", map(_packed, state.items()))
 
-    def add_second_looks(self, ids: Iterable[int], look: SecondLook) -> None:
-        """Record what was seen at a second look; a further one replaces it."""
-        columns = (look.fitness.tolist(), look.kept.tolist(), look.survives.tolist())
-        rows = [(i, look.dt, *row) for i, *row in zip(ids, *columns, strict=True)]
+    def put_second_look(self, ids: Iterable[int], look: SecondLook) -> None:
+        """Record what was seen at the second look, in place of any earlier one."""
+        columns = (
+            look.dt, look.halved, look.halved_kept, look.perturbed, look.perturbed_kept,
+            look.survives.astype(int),
+        )  # fmt: skip
+        rows = zip(ids, *(column.tolist() for column in columns), strict=True)
         with self._transaction():
+            self._connection.execute("DELETE FROM second_look")
             self._connection.executemany(
-                "INSERT OR REPLACE INTO second_look VALUES (?, ?, ?, ?, ?)", rows
+                "INSERT INTO second_look VALUES (?, ?, ?, ?, ?, ?, ?)", rows
             )
 
     # -- reading ---------------------------------------------------------------------------------
@@ -309,12 +312,12 @@ class Store:
         Those who survive come before those who do not, the fittest first, of equals the older.
         """
         rows = self._connection.execute(
-            "SELECT id, generation, individual.fitness, dt, second_look.fitness, kept, survives "
-            "FROM second_look JOIN individual ON id = individual "
-            "ORDER BY survives DESC, individual.fitness DESC, id"
+            "SELECT id, generation, fitness, dt, halved, halved_kept, perturbed, perturbed_kept, "
+            "survives FROM second_look JOIN individual ON id = individual "
+            "ORDER BY survives DESC, fitness DESC, id"
         )
         return [
-            Finalist(*row[:4], *(np.nan if x is None else x for x in row[4:6]), bool(row[6]))
+            Finalist(*row[:4], *(np.nan if x is None else x for x in row[4:8]), bool(row[8]))
             for row in rows
         ]
 
@@ -376,17 +379,28 @@ def _has_tables(path: Path) -> bool:
 def _check(connection: sqlite3.Connection, path: Path, thoroughly: bool) -> None:
     """Refuse what is not a sound record of this version."""
     try:
-        application = connection.execute("PRAGMA application_id").fetchone()[0]
-        version = connection.execute("PRAGMA user_version").fetchone()[0]
+        application, version = _marks(connection)
         problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0] if thoroughly else "ok"
     except sqlite3.DatabaseError as error:
         raise StoreError(f"{path} cannot be read: {error}") from None
     if application != APPLICATION_ID:
         raise StoreError(f"{path} is not the record of an evolution")
-    if version > SCHEMA_VERSION:
-        raise StoreError(
-            f"{path} was written by a newer version of evolve "
-            f"(format {version}, this one reads up to {SCHEMA_VERSION})"
-        )
+    _check_version(path, version)
     if problem != "ok":
         raise StoreError(f"{path} is damaged: {problem.splitlines()[-1]}")
+
+
+def _marks(connection: sqlite3.Connection) -> tuple[int, int]:
+    """Whose file it is, and the version of its format."""
+    names = ("application_id", "user_version")
+    application, version = (connection.execute(f"PRAGMA {n}").fetchone()[0] for n in names)
+    return application, version
+
+
+def _check_version(path: Path, version: int) -> None:
+    if version != SCHEMA_VERSION:
+        raise StoreError(
+            f"{path} was written by {'a newer' if version > SCHEMA_VERSION else 'an older'} "
+            f"version of evolve (format {version}, this one reads format {SCHEMA_VERSION}); "
+            "start its run.toml again with evolve run, or use that version"
+        )

@@ -17,6 +17,7 @@ class Role(IntEnum):
     SELECTION = 1
     CROSSOVER = 2
     MUTATION = 3
+    SECOND_LOOK = 4
 
 
 @dataclass(frozen=True)

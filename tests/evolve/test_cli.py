@@ -5,6 +5,7 @@ import pty
 import re
 import shutil
 import signal
+import sqlite3
 import subprocess
 import time
 
@@ -62,6 +63,9 @@ def test_a_run_says_what_it_does_and_what_it_wrote(example):
     assert sum(line.startswith("generation ") for line in lines) == 4
     assert "96 evaluations" in done.stdout and "springs/s" in done.stdout
     verdict = r"champion #\d+ of generation \d: [\d.]+ body diameters per cycle; "
+    verdict += (
+        r"[\d.]+ \(\d+%\) at half the time step, [\d.]+ \(\d+%\) from perturbed starts: survives"
+    )
     assert re.search(verdict, done.stdout)
     written = [line.strip() for line in lines[lines.index("wrote") + 1 :]]
     names = ["run.sqlite", "champion.usdc", "zoo.usdc", "zoo.png"]
@@ -95,7 +99,7 @@ def test_a_report_draws_and_tells(shell, run_folder):
     (run_folder / "dot_plot.png").unlink()
     report = shell("report", "runs/cube")
     assert report.returncode == 0, report.stderr
-    for subject in ("body", "search", "evaluations", "verdict", "digest"):
+    for subject in ("body", "search", "evaluations", "verdict", "second look", "digest"):
         assert f"\n{subject}" in f"\n{report.stdout}"
     assert report.stdout.endswith("runs/cube/dot_plot.png\n")
     assert (run_folder / "dot_plot.png").exists()
@@ -113,9 +117,23 @@ def test_an_export_shows_the_best_in_one_world(shell, run_folder):
     custom = [prim.GetCustomData() for prim in stage.Traverse()]
     custom = [data for data in custom if "individual" in data]
     assert len(custom) == len({data["individual"] for data in custom}) == 4
-    fitness = [data["fitness"] for data in custom]
-    assert fitness == sorted(fitness, reverse=True)
+    ranks = [(data["survivesSecondLook"], data["fitness"]) for data in custom]
+    assert ranks == sorted(ranks, reverse=True)
+    for name in ("AtHalfStep", "Perturbed"):
+        share = custom[0][f"fitness{name}"] / custom[0]["fitness"]
+        assert custom[0][f"kept{name}"] == pytest.approx(share) and share >= 0.8
     assert all(data["seed"] == 5 and data["run"] == "cube" for data in custom)
+
+
+def test_a_run_in_which_nobody_survives_says_so(shell, run_folder):
+    path = run_folder / "run.toml"
+    path.write_text(path.read_text().replace("threshold = 0.8", "threshold = 9.0"))
+    export = shell("export", "runs/cube")
+    assert export.returncode == 0, export.stderr
+    assert export.stdout.startswith("no champion: none of the 32 best survives the second look; ")
+    assert "champion.usdc" not in export.stdout and not (run_folder / "champion.usdc").exists()
+    assert (run_folder / "zoo.usdc").exists()
+    assert "0 of 32 survive" in words(shell("report", "runs/cube").stdout)
 
 
 MISTAKES = [
@@ -164,6 +182,17 @@ def test_a_broken_record_is_one_clear_line(shell, run_folder):
         assert done.stderr == (
             "evolve: runs/cube/run.sqlite cannot be read: file is not a database\n"
         )
+
+
+def test_a_run_of_an_older_version_is_one_clear_line(shell, run_folder):
+    with sqlite3.connect(run_folder / "run.sqlite") as connection:
+        connection.execute("PRAGMA user_version = 1")
+    path = run_folder / "run.toml"
+    path.write_text("[task]\nsecond_look = 0.8\n")
+    for name in ("resume", "report", "export", "digest"):
+        done = shell(name, "runs/cube")
+        assert done.returncode == 1 and done.stderr.count("\n") == 1
+        assert "was written by an older version of evolve (format 1" in done.stderr
 
 
 def test_ctrl_c_ends_at_a_generation_and_says_how_to_go_on(tmp_path):

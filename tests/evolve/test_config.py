@@ -98,6 +98,18 @@ MISTAKES = [
     ({"encoding.stiffness": [2, 1]}, "encoding.stiffness: expected two finite numbers"),
     ({"encoding.stiffness": [1, math.inf]}, "encoding.stiffness: expected two finite numbers"),
     ({"simulation.dt": 0.2}, "simulation.dt = 0.2 s is too long for cycles of 0.5 s"),
+    ({"simulation.dt": "auto", "encoding.period": 5e-3}, "simulation.dt = 0.001 s is too long for"),
+    (
+        {"simulation.dt": 0.0},
+        "simulation.dt: expected a number of seconds above 0, or 'auto', not 0",
+    ),
+    ({"simulation.dt": "fast"}, "simulation.dt: expected a number of seconds above 0, or"),
+    ({"simulation.dt": math.nan}, "simulation.dt: expected a number of seconds above 0, or"),
+    ({"task.second_look": 0.8}, "task.second_look: expected a table; the share to keep is"),
+    (
+        {"task.second_look.trails": 3},
+        "unknown key task.second_look.trails (did you mean 'trials'?)",
+    ),
     ({"task.fitness": "sped"}, "task.fitness: input should be 'speed' or 'distance'"),
     ({"name": "../up"}, "name: string should match pattern"),
     ({"seed.x": 1}, "seed: input should be a valid integer"),
@@ -111,6 +123,13 @@ def test_mistakes_are_named_in_one_line(change, message):
         load("cube", change)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("integrator", ["chin4", "leapfrog", "euler"])
+@pytest.mark.parametrize("dt", [1e-3, "auto"])
+def test_steps_and_integrators_can_be_chosen(integrator, dt):
+    config = load("cube", {"simulation.dt": dt, "simulation.integrator": integrator})
+    assert config.simulation.dt == dt and parse(dump(config), "copy") == config
 
 
 def test_presets_and_files_that_do_not_exist(tmp_path):

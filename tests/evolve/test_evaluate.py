@@ -94,23 +94,13 @@ def test_scores_tell_what_they_cost_and_describe(config, robots):
     np.testing.assert_allclose(scores.fitness, way / (0.1 * np.sqrt(3.0)))
 
 
-def test_the_second_look_halves_the_step_in_float64(robots):
-    coarse = load("cube", TINY | {"simulation.precision": "float32"})
-    fine = load("cube", TINY | {"simulation.dt": coarse.simulation.dt / 2})
-    first = Evaluator(coarse)(robots).fitness
-    look = Evaluator(coarse).second_look(robots, first)
-    again = Evaluator(fine)(robots).fitness
-    assert look.dt == fine.simulation.dt
-    np.testing.assert_array_equal(look.fitness, again)
-    np.testing.assert_allclose(look.kept, again / first)
-    np.testing.assert_array_equal(look.survives, again >= coarse.task.second_look * first)
-
-
-def test_nobody_survives_a_second_look_at_which_he_was_stopped(config, robots):
-    wild = [robots[0].replace(stiffness=1e12), robots[1]]
-    look = Evaluator(config).second_look(wild, np.array([0.1, 0.0]))
-    assert np.isnan(look.fitness[0]) and np.isnan(look.kept[1])
-    assert not look.survives.any()
+def test_a_step_of_its_own_for_each_robot_costs_what_it_takes(robots):
+    auto = load("cube", TINY | {"simulation.dt": "auto", "simulation.integrator": "chin4"})
+    stiff = [robots[0], robots[1].replace(stiffness=4e5)]
+    scores = Evaluator(auto)(stiff)
+    dt = ws.Simulation(stiff, auto.scene.build(), dt="auto", integrator="chin4").robot_dt
+    assert dt[1] < dt[0] < 1e-3
+    np.testing.assert_array_equal(scores.spring_evaluations, np.rint(1.0 / dt) * 28 * 3)
 
 
 def test_a_film_shows_the_whole_trial(config, robots):

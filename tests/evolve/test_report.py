@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 
 from evolve.errors import RunError
 from evolve.plots import dot_plot, figure, learning_curve
-from evolve.report import clock, draw, table, verdict
+from evolve.report import clock, demotions, draw, table, verdict
 from evolve.run import Run
 from evolve.screen import BLOCKS, Screen, sparkline
 from evolve.store import Finalist, Record
@@ -67,7 +70,7 @@ def test_drawing_writes_pictures_and_touches_no_global_state(tmp_path, tiny):
     assert not helpers.Gcf.get_all_fig_managers()
     assert matplotlib.rcParams._get_backend_or_none() == backend
     rows = table(run)
-    assert list(rows.columns[0].cells)[:3] == ["body", "search", "trial"]
+    assert list(rows.columns[0].cells)[:4] == ["body", "search", "trial", "crown"]
 
 
 def test_there_is_nothing_to_draw_before_the_first_generation(tmp_path, tiny):
@@ -77,14 +80,31 @@ def test_there_is_nothing_to_draw_before_the_first_generation(tmp_path, tiny):
         draw(run)
 
 
+GOOD = Finalist(7, 3, 0.5, 1e-4, 0.475, 0.95, 0.45, 0.9, True)
+BAD = Finalist(9, 2, 4.5, 1e-4, math.nan, math.nan, 0.045, 0.01, False)
+
+
 def test_a_verdict_says_whether_to_believe_it(tiny):
-    good = verdict(Finalist(7, 3, 0.5, 1e-4, 0.475, 0.95, True), tiny)
-    assert good == (
+    assert verdict([GOOD, BAD], tiny) == (
         "champion #7 of generation 3: 0.500 body diameters per cycle; "
-        "0.475 (95%) at half the time step: survives"
+        "0.475 (95%) at half the time step, 0.450 (90%) from perturbed starts: survives"
     )
-    bad = verdict(Finalist(7, 3, 0.5, 1e-4, float("nan"), float("nan"), False), tiny)
-    assert bad.endswith("; stopped at half the time step: does NOT survive")
+    assert verdict([BAD, BAD], tiny) == (
+        "no champion: none of the 2 best survives the second look; the fittest, "
+        "#9 of generation 2: 4.500 body diameters per cycle; "
+        "stopped at half the time step, 0.045 (1%) from perturbed starts"
+    )
+    assert verdict([BAD], tiny).startswith("no champion: the best does NOT survive the second look")
+
+
+def test_a_report_names_who_lost_the_crown():
+    assert demotions([GOOD, BAD]) == (
+        "1 of 2 survive; 1 fitter than the champion demoted, the fittest #9: 4.500; "
+        "stopped at half the time step, 0.045 (1%) from perturbed starts"
+    )
+    weak = dataclasses.replace(BAD, fitness=0.4)
+    assert demotions([GOOD, weak]) == "1 of 2 survive; nobody fitter than the champion was demoted"
+    assert demotions([BAD, weak]) == "0 of 2 survive"
 
 
 def test_a_clock_reads_minutes_and_hours():

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,9 +12,10 @@ import numpy as np
 import pytest
 
 from evolve.errors import RunError, StoreError
+from evolve.lock import Lock
 from evolve.run import Run
 from evolve.search import Search
-from evolve.store import Lock, Store
+from evolve.store import Store
 from evolve.toml import load
 from tests.evolve.conftest import TINY, command, environment, flags
 
@@ -144,6 +146,40 @@ def test_a_run_is_evolved_by_one_process_only(tmp_path, tiny):
     assert run.evolve()
 
 
+def test_what_a_killed_drawing_left_is_removed(tmp_path, tiny):
+    run = Run.create(tiny, tmp_path / "run")
+
+    def leave() -> None:
+        (run.directory / ".zoo-0123abcd.part").write_bytes(b"half a picture")
+        (run.directory / ".usd-x1y2").mkdir()
+        (run.directory / ".usd-x1y2/robots.usdc").write_bytes(b"half an animation")
+        (run.directory / ".mine").write_text("not ours")
+
+    def hidden() -> list[str]:
+        return [path.name for path in run.directory.iterdir() if path.name.startswith(".")]
+
+    leave()
+    with run.exporting():
+        assert hidden() == [".mine"]
+        leave()
+        with pytest.raises(StoreError, match="is being exported by another process"):
+            run.exporting().__enter__()
+        run.evolve(should_stop=lambda: True)
+        assert len(hidden()) == 3, "they may belong to the one who is exporting"
+    run.evolve(should_stop=lambda: True)
+    assert hidden() == [".mine"]
+
+
+def test_the_second_look_may_be_configured_afterwards(finished, tmp_path):
+    folder = shutil.copytree(finished.directory, tmp_path / "run")
+    path = folder / "run.toml"
+    path.write_text(path.read_text().replace("trials = 16", "trials = 3"))
+    run = Run.open(folder)
+    assert run.config.task.second_look.trials == 3
+    assert run.evolve()
+    assert digest(run) == digest(finished)
+
+
 LONG = TINY | {"generations": 14, "population": 64}
 
 
@@ -178,8 +214,9 @@ def test_sigkill_at_a_random_moment_changes_nothing(undisturbed, moment, tmp_pat
     names = {path.name for path in folder.iterdir()}
     expected = {"champion.usdc", "zoo.usdc", "zoo.png", "learning_curve.png", "dot_plot.png"}
     assert expected <= names
+    assert not [name for name in names if name.endswith(".part") or name.startswith(".usd-")]
     with Store.open(folder / "run.sqlite") as store:
-        assert len(store.finalists()) == 9
+        assert len(store.finalists()) == 32
 
 
 def wait_for_folder(folder, process) -> None:

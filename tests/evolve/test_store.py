@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from evolve.errors import StoreError
-from evolve.evaluate import SecondLook
+from evolve.lock import Lock
 from evolve.optimizers import NOBODY, Candidates
 from evolve.scores import Scores
-from evolve.store import APPLICATION_ID, Lock, Store, Timing
+from evolve.second_look import SecondLook
+from evolve.store import APPLICATION_ID, SCHEMA_VERSION, Finalist, Store, Timing
 
 DESCRIPTORS = ("height", "a name with spaces")
 
@@ -105,16 +106,29 @@ def test_the_best_are_different_and_have_a_fitness(store):
 
 def test_finalists_are_ordered_champion_first(store):
     look = SecondLook(
-        dt=1e-4,
-        fitness=np.array([0.1, np.nan, 0.1]),
-        kept=np.array([0.15, np.nan, 1.0]),
+        dt=np.array([1e-4, 1e-4, 5e-5]),
+        halved=np.array([0.1, np.nan, 0.1]),
+        halved_kept=np.array([0.15, np.nan, 1.0]),
+        perturbed=np.array([0.5, 0.6, 0.09]),
+        perturbed_kept=np.array([0.75, 0.9, 0.9]),
         survives=np.array([False, False, True]),
     )
-    store.add_second_looks([3, 6, 1], look)
+    store.put_second_look([3, 6, 1], look)
     finalists = store.finalists()
     assert [f.id for f in finalists] == [1, 3, 6]
-    assert finalists[0].survives and finalists[0].fitness == 0.1 and finalists[0].generation == 0
-    assert np.isnan(finalists[2].second_fitness) and not finalists[2].survives
+    assert finalists[0] == Finalist(1, 0, 0.1, 5e-5, 0.1, 1.0, 0.09, 0.9, True)
+    assert np.isnan([finalists[2].halved, finalists[2].halved_kept]).all()
+    assert finalists[2].perturbed == 0.6 and not finalists[2].survives
+
+
+def test_a_second_look_replaces_the_one_before_and_decides_nothing(store):
+    before = store.digest()
+    figures = np.ones(2)
+    look = SecondLook(figures, figures, figures, figures, figures, figures > 0.0)
+    store.put_second_look([3, 6], look)
+    store.put_second_look([4, 1], look)
+    assert [f.id for f in store.finalists()] == [1, 4]
+    assert store.digest() == before
 
 
 def test_the_digest_changes_with_every_decision_and_with_nothing_else(store):
@@ -152,14 +166,26 @@ def test_files_that_are_no_records_are_refused(tmp_path):
         Store.open(path)
 
 
-def test_a_newer_record_is_refused(store):
+@pytest.mark.parametrize(("version", "age"), [(99, "a newer"), (1, "an older")])
+def test_a_record_of_another_format_is_refused(store, version, age):
     store.close()
+    Store.check_format(store.path)
     with sqlite3.connect(store.path) as connection:
-        connection.execute("PRAGMA user_version = 99")
-    with pytest.raises(StoreError, match=r"newer version of evolve \(format 99, this one reads"):
-        Store.open(store.path)
+        connection.execute(f"PRAGMA user_version = {version}")
+    words = rf"{age} version of evolve \(format {version}, this one reads format {SCHEMA_VERSION}\)"
+    for refuse in (Store.open, Store.check_format):
+        with pytest.raises(StoreError, match=words):
+            refuse(store.path)
     with sqlite3.connect(store.path) as connection:
         assert connection.execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
+
+
+def test_only_records_have_a_format(tmp_path):
+    path = tmp_path / "run.sqlite"
+    Store.check_format(path)
+    assert not path.exists()
+    path.write_bytes(b"no database" * 1000)
+    Store.check_format(path)
 
 
 def test_a_damaged_record_is_refused(store):
