@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from accuracy_measure import Row, Series, cost_of, recommended
+from accuracy_measure import Row, Series, cost_of, evaluations, simulate
 from accuracy_scenes import Case, Truth
 from two_kernels import two_kernels
 
@@ -38,7 +38,6 @@ class Comparison:
         their_error: Its error [m].
         difference: By how much the two programs differ when both take symplectic Euler [m].
         evaluations: Spring evaluations of one robot, ours and theirs.
-        fewest: Spring evaluations of the integrator that needs fewest.
         seconds: Wall time for one robot [s], ours and theirs.
         ratio: Theirs over ours, in seconds.
         threads: Cores that are used here; the two kernels use one.
@@ -53,7 +52,6 @@ class Comparison:
     their_error: float
     difference: float
     evaluations: tuple[float, float]
-    fewest: float
     seconds: tuple[float, float]
     ratio: float
     threads: int
@@ -139,71 +137,65 @@ def compare(
     series: dict[Series, list[Row]] = {}
     for row in rows:
         series.setdefault(row.series, []).append(row)
-    reached = [found for own in series.values() if (found := recommended(own, target))]
-    their_evaluations = cost_of(series[EULER], target)
-    if not reached or their_evaluations is None:
+    seconds = {way: cost_of(own, target, "seconds") for way, own in series.items()}
+    reached = {way: cost for way, cost in seconds.items() if cost is not None}
+    if EULER not in reached or len(reached) == 1:
         return None
-    ours = min((row for row in reached if row.series != EULER), key=lambda row: row.seconds)
-    costs = [cost_of(own, target) for way, own in series.items() if way != EULER]
-    their_dt, their_error = _their_step(case, truth, their_evaluations, target)
+    ours = min(reached.keys() - {EULER}, key=lambda way: (reached[way], str(way)))
+    own_dt, own_error = _step(case, truth, ours, cost_of(series[ours], target), target)
+    their_dt, their_error = _step(case, truth, EULER, cost_of(series[EULER], target), target)
 
     robots = case.batch(ROBOTS)
     theirs = TwoKernels(robots, case.scene, their_dt)
     theirs.run(1)
     share = round(case.duration / their_dt) / STEPS
-    ratios, seconds = [], []
+    walls, threads = [], 1
     for _ in range(rounds):
-        simulation = _simulation(robots, case, ours.series, ours.dt)
+        simulation = simulate(robots, case, ours, own_dt)
         own = simulation.run(case.duration).wall_time / ROBOTS
-        peer = theirs.run(STEPS) * share / ROBOTS
-        ratios.append(peer / own)
-        seconds.append((own, peer))
+        walls.append((own, theirs.run(STEPS) * share / ROBOTS))
+        threads = simulation.threads
+    own_wall, their_wall = np.median(walls, axis=0)
     return Comparison(
         scene=name,
         target=target,
-        ours=ours.series,
-        dt=ours.dt,
-        error=ours.error,
+        ours=ours,
+        dt=own_dt,
+        error=own_error,
         their_dt=their_dt,
         their_error=their_error,
         difference=_difference(case),
-        evaluations=(ours.evaluations, case.robot.n_springs * case.duration / their_dt),
-        fewest=min(cost for cost in costs if cost is not None),
-        seconds=tuple(np.median(seconds, axis=0).tolist()),
-        ratio=float(np.median(ratios)),
-        threads=simulation.threads,
+        evaluations=(evaluations(case, ours, own_dt), evaluations(case, EULER, their_dt)),
+        seconds=(float(own_wall), float(their_wall)),
+        ratio=float(np.median([peer / own for own, peer in walls])),
+        threads=threads,
     )
 
 
-def _their_step(case: Case, truth: Truth, evaluations: float, target: float) -> tuple[float, float]:
-    """A step with which symplectic Euler reaches an error, and its error there."""
-    dt = case.robot.n_springs * case.duration / evaluations
+def _step(
+    case: Case, truth: Truth, series: Series, cost: float, target: float
+) -> tuple[float, float]:
+    """The largest step with which a series reaches an error, and its error there.
+
+    The search comes down from above the step that the curve promises, and the next smaller step
+    must do as well: one alone may be luck.
+    """
+    dt = 1.4e-3 * evaluations(case, series, 1e-3) / cost
+    robots, before = case.batch(len(truth.values)), None
     while True:
         dt = case.duration / round(case.duration / dt)
-        judged = case.batch(len(truth.values))
-        result = _simulation(judged, case, EULER, dt).run(case.duration)
+        result = simulate(robots, case, series, dt).run(case.duration)
         error = float(np.median(case.errors(result, truth)))
-        if error <= 1.05 * target:
-            return dt, error
-        dt *= 0.9
+        if error <= target and before:
+            return before
+        before = (dt, error) if error <= target else None
+        dt *= 0.93
 
 
 def _difference(case: Case, dt: float = 1e-4, robots: int = 4) -> float:
     """Largest difference between our symplectic Euler and that of the two kernels [m]."""
     few = case.batch(robots)
-    ours = _simulation(few, case, EULER, dt).run(case.duration)
+    ours = simulate(few, case, EULER, dt).run(case.duration)
     theirs = TwoKernels(few, case.scene, dt)
     theirs.run(ours.steps)
     return max(float(np.abs(ours.positions(i) - theirs.positions(i)).max()) for i in range(robots))
-
-
-def _simulation(robots, case: Case, series: Series, dt: float) -> ws.Simulation:
-    one = 1 if series.substeps == "one" else None
-    return ws.Simulation(
-        robots,
-        case.scene,
-        dt,
-        precision=series.precision,
-        integrator=series.integrator,
-        contact_substeps=one,
-    )

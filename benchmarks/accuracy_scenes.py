@@ -15,7 +15,7 @@ from accuracy_truth import rest, solve
 
 import warp_springs as ws
 
-__all__ = ["CASES", "G", "SMOOTH", "Case", "Truth"]
+__all__ = ["CASES", "Case", "G", "Truth"]
 
 G = 9.81
 WEIGHTLESS = ws.Scene(gravity=(0.0, 0.0, 0.0), ground=None)
@@ -120,14 +120,14 @@ class Case:
 def solved(case: Case, measure: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Truth:
     """Truth by the solver; ``measure`` takes positions (M, 3).
 
-    Its uncertainty is what a tolerance a hundred times larger changes.
+    Its uncertainty is what a tolerance ten times larger changes.
     """
 
     def one(robot: ws.Robot, tolerance: float) -> np.ndarray:
         return measure(solve(robot, case.scene, case.duration, tolerance).positions)
 
     values = np.array([one(robot, case.tolerance) for robot in case.batch(case.judged)])
-    uncertainty = np.abs(values[0] - one(case.robot, 100 * case.tolerance)).max()
+    uncertainty = np.abs(values[0] - one(case.robot, 10 * case.tolerance)).max()
     return Truth(values, float(uncertainty), "event-driven Runge-Kutta 8")
 
 
@@ -400,7 +400,7 @@ def _cases() -> dict[str, Case]:
             of="the way",
             fraction=1e-2,
             measure=travelled,
-            tolerance=1e-9,
+            tolerance=1e-10,
         ),
     }
 

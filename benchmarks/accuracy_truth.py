@@ -158,7 +158,7 @@ class _World:
     def switch(self, time: float, y: np.ndarray, broken: int) -> np.ndarray:
         """Change the state of a mass whose margin is used up; the solution it goes on with."""
         y = y.copy()
-        x, v = self.split(y)
+        x = self.split(y)[0]
         kind, mass = divmod(broken, len(x))
         if kind == 0:
             x[mass, 2] = 0.0

@@ -4,9 +4,9 @@
     python benchmarks/search.py --generations 15          # a smaller budget, about 2 minutes
     python benchmarks/search.py --preset cube --json search.json
 
-Every search keeps its nine best; they are simulated again at half the time step in float64. The
-table shows the fittest who survives that, its fitness there, and its lead over the champion of
-random search with the same seed.
+Every search keeps its nine best; they are simulated again, at half the time step in float64 and from
+perturbed starts. The table shows the fittest who survives both, its fitness at half the step, and
+its lead over the champion of random search with the same seed.
 """
 
 from __future__ import annotations

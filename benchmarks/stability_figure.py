@@ -129,8 +129,8 @@ def _titles(figure, grid) -> None:
     figure.text(
         0.03,
         0.908,
-        "A spinning cube of 28 springs bounces on a corner: how far its masses are from a reference "
-        "after 0.3 s.\nWhat does not vary: k = 1000 N/m, m = 0.1 kg, K$_G$ = 10$^5$ N/m.",
+        "A spinning cube of 28 springs bounces on a corner: how far its masses are from a "
+        "reference after 0.3 s.\nWhat does not vary: k = 1000 N/m, m = 0.1 kg, K$_G$ = 10$^5$ N/m.",
         fontsize=9.5,
         color=QUIET,
         va="center",

@@ -97,7 +97,7 @@ def _tangled(rng: np.random.Generator) -> ws.Robot:
     rest = np.where(rng.random(springs) < 0.5, 0.0, _decades(rng, -3, 1, springs))
     return ws.Robot(
         masses=_decades(rng, *((-2, 1) if tame else (-9, 6)), masses),
-        positions=positions + (0.0, 0.0, rng.uniform(-0.1, 1.0)),
+        positions=positions + np.array([0.0, 0.0, rng.uniform(-0.1, 1.0)]),
         springs=np.stack([start, end], axis=1),
         stiffness=_decades(rng, *((-3, 4) if tame else (-3, 12)), springs),
         rest_length=rest if rng.random() < 0.5 else None,

@@ -17,11 +17,10 @@ __all__ = ["CASES", "Rest", "measure"]
 DT = 1e-3
 SETTLE, SETTLE_DAMPING = 4.0, 20.0  # s, 1/s
 FRAMES = 200
+#: The slope is one of 20 degrees, the ice has no friction.
 GROUNDS = {
     "level": ws.Scene(),
-    "slope of 20 degrees": ws.Scene(
-        gravity=(9.81 * np.sin(np.pi / 9), 0.0, -9.81 * np.cos(np.pi / 9))
-    ),
+    "slope": ws.Scene(gravity=(9.81 * np.sin(np.pi / 9), 0.0, -9.81 * np.cos(np.pi / 9))),
     "ice": ws.Scene(ground=ws.Ground(static_friction=0.0, kinetic_friction=0.0)),
 }
 CASES = tuple(
@@ -80,8 +79,8 @@ def measure(integrator: str, precision: str, ground: str, seconds: float) -> Res
         precision,
         ground,
         seconds,
-        drift=max(drift),
-        wobble=max(wobble),
+        drift=float(max(drift)),
+        wobble=float(max(wobble)),
         early=float(kinetic[:, 1 : part + 1].max()),
         late=float(kinetic[:, -part:].max()),
         stopped=int((result.status != ws.Status.OK).sum()),
@@ -90,7 +89,7 @@ def measure(integrator: str, precision: str, ground: str, seconds: float) -> Res
 
 
 def _robots() -> list[ws.Robot]:
-    """Shapes as they stand, and a cube turned on the spot: eight, one bundle."""
+    """Shapes as they stand, and a cube turned on the spot."""
     bridge = np.ones((3, 1, 2), bool)
     bridge[1, 0, 0] = False
     shapes = ws.shapes

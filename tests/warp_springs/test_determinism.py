@@ -136,6 +136,22 @@ def test_variants_give_the_bits_of_the_robots_they_stand_for(alone):
     assert fingerprint(stacked, 13) == expected[1]
 
 
+def test_own_steps_depend_on_the_robot_alone():
+    rng = np.random.default_rng(5)
+    stiff = [
+        body.replace(stiffness=factor * body.stiffness)
+        for body in bodies()
+        for factor in (1.0, 9.0, 81.0)
+    ]
+    batch = strangers(2 * len(stiff), rng)
+    batch[::2] = stiff
+    assert len(set(ws.Simulation(batch, SCENE, dt="auto").robot_dt)) > 2
+    together = ws.Simulation(batch, SCENE, dt="auto").run(DURATION, fps=FPS, energy=True)
+    for i, robot in enumerate(stiff):
+        lonely = ws.Simulation(robot, SCENE, dt="auto").run(DURATION, fps=FPS, energy=True)
+        assert fingerprint(together, 2 * i) == fingerprint(lonely, 0)
+
+
 def test_same_bits_twice(alone):
     settings, expected = alone
     assert fingerprint(simulate(bodies()[0], *settings), 0) == expected[0]

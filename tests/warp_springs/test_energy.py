@@ -62,14 +62,16 @@ def test_energy_is_measured_only_on_request(cube):
     assert ws.Simulation(cube, ws.Scene(), dt=1e-3).run(0.01, fps=100).energy is None
 
 
-def test_spinning_bouncing_cube_keeps_its_energy(tumbling_cube):
+@pytest.mark.parametrize(("integrator", "fraction"), [("leapfrog", 1e-4), ("chin4", 1e-5)])
+def test_spinning_bouncing_cube_keeps_its_energy(tumbling_cube, integrator, fraction):
     ground = ws.Ground(stiffness=1e5, static_friction=0.0, kinetic_friction=0.0)
-    simulation = ws.Simulation(tumbling_cube, ws.Scene(ground=ground), dt=1e-4)
+    scene = ws.Scene(ground=ground)
+    simulation = ws.Simulation(tumbling_cube, scene, dt=1e-4, integrator=integrator)
     total = simulation.run(2.0, fps=200, energy=True).energy.total[0]
-    # Symplectic: the error oscillates (measured 3e-5 of the total) and does not drift (3e-6).
-    assert np.abs(total / total[0] - 1.0).max() < 1e-4
+    # Symplectic: the error oscillates (measured 3e-5 and 3e-6 of the total) and does not drift.
+    assert np.abs(total / total[0] - 1.0).max() < fraction
     late, early = total[-100:].mean(), total[:100].mean()
-    assert late == pytest.approx(early, rel=1e-5)
+    assert late == pytest.approx(early, rel=fraction / 10)
 
 
 # What comes in and what is lost.
@@ -133,7 +135,7 @@ def test_residual_of_the_ledger_shrinks_with_the_order_of_the_integrator(walker,
 
 def test_muscles_do_the_work_that_a_body_gains(walker):
     free = ws.Scene(gravity=(0, 0, 0), ground=None)
-    simulation = ws.Simulation(walker, free, dt=1e-4)
+    simulation = ws.Simulation(walker, free, dt=1e-4, integrator="leapfrog")
     energy = simulation.run(1.0, fps=50, energy=True).energy
     gain = energy.total[0] - energy.total[0, 0]
     assert np.abs(gain).max() > 0.05

@@ -23,7 +23,6 @@ GRID = 0.1 * np.array(list(itertools.product(range(3), repeat=3)), dtype=float)
 
 SCENES = {
     "free flight": ws.Scene(gravity=(0.5, -1.0, -9.81), ground=None),
-    "frictionless": ws.Scene(ground=ws.Ground(static_friction=0.0, kinetic_friction=0.0)),
     "coulomb": ws.Scene(ground=ws.Ground()),
     "course": ws.Scene(ground=ws.Ground(stiffness=5e4, friction="course")),
     "everything": ws.Scene(
@@ -41,13 +40,16 @@ SCENES = {
 }
 
 
+# Every combination of features is a kernel to compile: robots breathe in some scenes only.
+BREATHING = ("free flight", "everything", "everything, course")
+
+
 @st.composite
 def robots(draw):
     """A random tangle: unequal masses and springs, pre-stressed, breathing, falling or landed."""
     n_masses = draw(st.integers(1, 9))
     n_springs = draw(st.integers(0, n_masses * (n_masses - 1) // 2))
     clearance = draw(st.sampled_from([-1e-3, 0.0, 1e-3, 5e-3]))
-    breathing = draw(st.booleans())
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     positions = rng.permutation(GRID)[:n_masses] + rng.uniform(-0.02, 0.02, (n_masses, 3))
     positions[:, 2] += clearance - positions[:, 2].min()
@@ -62,7 +64,7 @@ def robots(draw):
         springs=springs,
         stiffness=rng.uniform(200.0, 2000.0, n_springs),
         rest_length=rest,
-        amplitude=rest * rng.uniform(0.0, 0.2, n_springs) if breathing else 0.0,
+        amplitude=rest * rng.uniform(0.0, 0.2, n_springs),
         phase=rng.uniform(0.0, 2 * np.pi, n_springs),
         omega=float(rng.uniform(5.0, 50.0)),
     )
@@ -89,14 +91,16 @@ def compare(batch, scene, integrator, precision="float64"):
 
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "chin4", "euler"])
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+@pytest.mark.parametrize("name", SCENES)
 @settings(max_examples=7)
 @given(single=robots(), shared=robots())
-def test_random_robots_follow_the_reference(scene, integrator, single, shared):
+def test_random_robots_follow_the_reference(name, integrator, single, shared):
+    if name not in BREATHING:
+        single, shared = (robot.replace(amplitude=0.0) for robot in (single, shared))
     # Robots of one topology are stepped together, in lanes; a robot that is the only one is not.
     family = [shared.replace(stiffness=factor * shared.stiffness) for factor in (1.0, 0.8, 1.2)]
     batch = [family[0], single, *family[1:]]
-    position_errors, velocity_errors, margin = compare(batch, scene, integrator)
+    position_errors, velocity_errors, margin = compare(batch, SCENES[name], integrator)
     assume(margin > 1e-9)
     # Rounding makes 3e-14 and 3e-13 of it, measured over these 200 steps.
     assert position_errors.max() < 1e-11
