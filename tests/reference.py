@@ -121,15 +121,16 @@ class Trial:
         """Velocities at the same instant as the positions [m/s], shape (M, 3).
 
         A step that kicks and drifts keeps them before the kick that would end it; it is added to
-        a copy here. A mass in the ground feels the friction of that kick too, so that a stuck
-        mass reports rest.
+        a copy here. The state has had its friction already; a mass in the ground that the kick
+        would not set free reports rest.
         """
         if self._closing_kick is None or self.steps == 0:
             return self._state.copy()
         velocities = self._dragged(self._damped(self._state, self._span / 2), self._span / 2)
         velocities = self._kicked(velocities, self._spring_forces(), self._closing_kick)
         if self._friction == "coulomb":
-            self._rub(velocities, self._normal_forces() / self.masses * self._closing_kick)
+            impulse = self._normal_forces() / self.masses * self._closing_kick
+            self._rub(velocities, impulse, holds_only=True)
         return velocities
 
     # What acts on a mass.
@@ -159,7 +160,7 @@ class Trial:
         scale = max(value, threshold, np.finfo(float).tiny)
         self.margin = min(self.margin, abs(value - threshold) / scale)
 
-    def _rub(self, velocities, impulse):
+    def _rub(self, velocities, impulse, holds_only=False):
         """Coulomb friction in place: `impulse` is the normal impulse per mass [m/s], (M,)."""
         ground = self.scene.ground
         for i in np.flatnonzero(impulse > 0.0):
@@ -167,7 +168,7 @@ class Trial:
             self._note(slip, ground.static_friction * impulse[i])
             if slip <= ground.static_friction * impulse[i]:
                 velocities[i, XY] = 0.0
-            else:
+            elif not holds_only:
                 keep = 1.0 - ground.kinetic_friction * impulse[i] / slip
                 velocities[i, XY] *= max(0.0, keep)
 

@@ -40,7 +40,8 @@ class Energy:
     @property
     def total(self) -> np.ndarray:
         """Kinetic, gravity, spring and ground energy, shape (N, F)."""
-        return self.kinetic + self.gravity + self.spring + self.ground
+        with np.errstate(invalid="ignore"):  # infinities of a robot that was refused
+            return self.kinetic + self.gravity + self.spring + self.ground
 
     @property
     def losses(self) -> np.ndarray:
@@ -50,4 +51,5 @@ class Energy:
     @property
     def residual(self) -> np.ndarray:
         """Change of the total since the first frame, less the work, plus the losses, (N, F)."""
-        return self.total - self.total[:, :1] - self.work + self.losses
+        with np.errstate(invalid="ignore"):
+            return self.total - self.total[:, :1] - self.work + self.losses

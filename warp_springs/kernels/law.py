@@ -120,9 +120,9 @@ auto ground_force = [=](real z) __attribute__((always_inline)) -> real {
 
 // Coulomb's law for one step: a normal impulse j (per unit of mass) stops a tangential velocity
 // up to mu_s j and shortens a larger one by mu_k j along its own direction.
-auto coulomb = [=](real& ux, real& uy, real j) __attribute__((always_inline)) {
+auto coulomb = [=](real& ux, real& uy, real j, scalar kinetic) __attribute__((always_inline)) {
     real speed = square_root(ux * ux + uy * uy);
-    real left = scalar(1) - kinetic_friction * j / select(speed > zero, speed, zero + scalar(1));
+    real left = scalar(1) - kinetic * j / select(speed > zero, speed, zero + scalar(1));
     left = select(left > zero, left, zero);
     real factor = select((j > zero) & (speed <= static_friction * j), zero, left);
     ux *= factor; uy *= factor;
@@ -191,10 +191,11 @@ auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__(
     drag_flow(v, w, time);
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
-auto rub = [=](Vec& v, real impulse, Losses& losses) __attribute__((always_inline)) {
+auto rub = [=](Vec& v, real impulse, Losses& losses, scalar kinetic)
+        __attribute__((always_inline)) {
     if (!COULOMB) return;
     const Vec before = v;
-    coulomb(v.x, v.y, impulse);
+    coulomb(v.x, v.y, impulse, kinetic);
     if (LEDGER) losses.friction = losses.friction + (before - v);
 };
 // The classroom's friction belongs to the kick, since it works on the force.
@@ -238,9 +239,9 @@ auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, rea
             left_over = impulse - usable;
             impulse = usable;
         }
-        rub(v, impulse, losses);
+        rub(v, impulse, losses, kinetic_friction);
     } else if (CHIN4) {
-        if (last && any(left_over > zero)) rub(v, left_over, losses);
+        if (last && any(left_over > zero)) rub(v, left_over, losses, kinetic_friction);
         left_over = zero;
     }
 };
@@ -252,13 +253,14 @@ auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool las
     v.z = u;
 };
 
-// The velocity at t_n, from the state before its kicks: what the last part of them adds, with the
-// friction of as much time, so that a mass that sticks is reported at rest.
+// The velocity at t_n, from the state before its kicks: what the last part of them adds. The state
+// has had its friction up to t_n; here friction only holds what sticks, so that it is reported at
+// rest.
 auto synchronise = [=](Vec& v, Vec f, real w, real z, Losses& losses)
         __attribute__((always_inline)) {
     lose_before(v, w, losses);
     kick(v, f, w, z, FIRST_KICK, losses);
-    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, losses);
+    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, losses, scalar(0));
 };
 
 // Work of a loss that changed the velocity of a mass by -lost while it went from `before` to
@@ -281,7 +283,7 @@ auto euler_step = [=](Vec& x, Vec& v, Vec f, real w, Losses& losses)
         v.x += a.x * dt; v.y += a.y * dt; v.z += a.z * dt;
         if (LEDGER) losses.friction = losses.friction + (free - v);
     } else v = free;
-    if (GROUND) rub(v, push * dt, losses);
+    if (GROUND) rub(v, push * dt, losses, kinetic_friction);
     damp(v, losses);
     damp(v, losses);
     slow_down(v, w, dt, losses);
