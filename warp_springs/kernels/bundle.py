@@ -1,0 +1,249 @@
+"""A bundle as the kernels see it: its blocks, the force on a mass, its health, and a look at it.
+
+C++ text for W robots of one topology in the lanes; ``kernels.lanes`` puts it together with the
+passes that step them.
+"""
+
+from dataclasses import astuple, dataclass
+
+from warp_springs.kernels.buffers import BUNDLE
+from warp_springs.kernels.dialect import vector_dialect
+from warp_springs.kernels.law import CONSTANTS, LAW
+
+__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "Features", "preamble"]
+
+#: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
+#: of the simulation.
+CHECK_EVERY = 64
+
+
+@dataclass(frozen=True)
+class Features:
+    """What a kernel is compiled for; everything else is left out of it."""
+
+    precision: str
+    width: int
+    actuated: bool
+    ground: bool
+    friction: str  # "none", "coulomb", "course"
+    damping: bool
+    drag: bool
+    integrator: str
+    ledger: bool = False  # whether energies are asked for
+
+    @property
+    def name(self) -> str:
+        """A name for the module, with everything the code depends on."""
+        return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
+
+
+def preamble(features: Features) -> str:
+    """What both kernels begin with: the number type, the features, the law, the bundle."""
+    flags = {
+        "ACTUATED": features.actuated,
+        "GROUND": features.ground,
+        "COULOMB": features.friction == "coulomb",
+        "COURSE": features.friction == "course",
+        "DAMPING": features.damping,
+        "DRAG": features.drag,
+        "EULER": features.integrator == "euler",
+        "CHIN4": features.integrator == "chin4",
+        "LEDGER": features.ledger,
+    }
+    lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
+    lines += [
+        f"const int64_t {column}_ = model.bundles.data[bundle * {len(BUNDLE)} + {i}];"
+        for i, column in enumerate(BUNDLE)
+    ]
+    lines += [f"const double* const run = model.constants.data + level_ * {len(CONSTANTS)};"]
+    lines += ["const double exact_dt = run[0];"]
+    lines += [f"const scalar {name} = scalar(run[{i}]);" for i, name in enumerate(CONSTANTS)]
+    lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
+    return vector_dialect(features.precision, features.width) + "\n".join(lines) + LAW + _BUNDLE
+
+
+# What both kernels need: the blocks of one bundle, one row of springs, its health.
+_BUNDLE = r"""
+const int M = (int)masses_, S = (int)springs_, substeps = (int)substeps_;
+Vec* const x = (Vec*)(state.positions.data + state_);
+Vec* const v = (Vec*)(state.velocities.data + state_);
+Vec* const good_x = (Vec*)(state.good_positions.data + state_);
+Vec* const good_v = (Vec*)(state.good_velocities.data + state_);
+const real* const w = (const real*)(model.inverse_masses.data + mass_);
+const real* const p = (const real*)(model.coefficients.data + spring_);
+const int* const row = model.rows.data + row_;
+const int* const partner = model.partners.data + partner_;
+real& sine = *(real*)(state.oscillators.data + 4 * lane_);
+real& cosine = *(real*)(state.oscillators.data + 4 * lane_ + W);
+const real turn_cosine = *(const real*)(state.oscillators.data + 4 * lane_ + 2 * W);
+const real turn_sine = *(const real*)(state.oscillators.data + 4 * lane_ + 3 * W);
+real omega = zero;
+for (int l = 0; LEDGER && l < W; ++l) omega[l] = scalar(model.omegas.data[lane_ + l]);
+const real reach2 = *(const real*)(model.reaches2.data + lane_);
+int* const health = state.states.data + lane_;
+double* const health_time = state.state_times.data + lane_;
+Vec* const F = (Vec*)scratch.data;
+Vec* const shifted_x = F + M;
+real* const left_over = (real*)(shifted_x + M);
+const int K = ACTUATED ? 4 : 2;
+
+auto stiffness = [=](int s) -> real { return p[K * s]; };
+// Accounts of the ledger since it was opened: work of the breathing springs, and losses to
+// damping, drag and friction [J].
+real* const ledger = (real*)(state.ledgers.data + 8 * lane_);
+real* const good_ledger = ledger + 4;
+real power = zero;
+auto enter = [&](const Losses& losses, Vec before, Vec after, real w)
+        __attribute__((always_inline)) {
+    if (!LEDGER) return;
+    if (DAMPING) ledger[1] += loss_work(losses.damping, before, after, w);
+    if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
+    if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
+};
+
+auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
+    return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
+};
+// The whole force on mass i where the masses are at x; forces on later masses are left in F.
+auto row_force = [&](const Vec* x, int i, real si, real co)
+        __attribute__((always_inline)) -> Vec {
+    const Vec a = x[i];
+    Vec f = F[i];
+    F[i] = Vec{zero, zero, zero};
+    for (int s = row[i]; s < row[i + 1]; ++s) {
+        const int j = partner[s];
+        real dx = x[j].x - a.x, dy = x[j].y - a.y, dz = x[j].z - a.z;
+        const real length2 = squared_length(dx, dy, dz), k = stiffness(s);
+        const real q = stiffness_times_rest(s, si, co);
+        if (LEDGER && ACTUATED)
+            power += breathing_power(length2, k, q,
+                                     breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega));
+        const real pull = spring_pull(length2, k, q);
+        real px = pull * dx, py = pull * dy, pz = pull * dz;
+        f.x += px; f.y += py; f.z += pz;
+        F[j].x -= px; F[j].y -= py; F[j].z -= pz;
+    }
+    return f;
+};
+// The reasons, by lane, why a robot must be stopped now, as values of warp_springs.Status: 1 not
+// finite, 2 overstretched, 3 too fast, 4 too deep; 0 none.
+auto diagnose = [=]() -> mask {
+    const real limit2 = zero + speed_limit * speed_limit;
+    real poison = zero;
+    mask fast = zero > zero, stretched = fast, deep = fast;
+    for (int i = 0; i < M; ++i) {
+        const Vec a = x[i], u = v[i];
+        poison += (a.x + a.y + a.z + u.x + u.y + u.z) * scalar(0);
+        fast |= u.x * u.x + u.y * u.y + u.z * u.z > limit2;
+        if (GROUND) deep |= a.z < -depth_limit;
+        for (int s = row[i]; s < row[i + 1]; ++s) {
+            const Vec b = x[partner[s]];
+            stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
+        }
+    }
+    const mask finite = poison == zero;
+    mask reason = deep & 4;
+    reason = stretched ? (mask{} + 2) : reason;
+    reason = fast ? (mask{} + 3) : reason;
+    return finite ? reason : (mask{} + 1);
+};
+auto stopped_lanes = [=]() -> mask {
+    mask stopped;
+    for (int l = 0; l < W; ++l) stopped[l] = health[l] != 0 ? -1 : 0;
+    return stopped;
+};
+"""
+
+CONTROL = r"""
+// Stops the robots that went wrong since the last check where they were last good.
+auto check = [&](long long n) {
+    mask stopped = stopped_lanes();
+    const mask reason = diagnose() & ~stopped;
+    if (any(reason != 0)) {
+        for (int l = 0; l < W; ++l)
+            if (reason[l] != 0) {
+                health[l] = (int)reason[l];
+                health_time[l] = double(n) * exact_dt;
+            }
+        stopped = stopped_lanes();
+    }
+    auto restore = [&](real& now, real& good) __attribute__((always_inline)) {
+        now = good = select(stopped, good, now);
+    };
+    for (int i = 0; i < M; ++i) {
+        restore(x[i].x, good_x[i].x); restore(x[i].y, good_x[i].y); restore(x[i].z, good_x[i].z);
+        restore(v[i].x, good_v[i].x); restore(v[i].y, good_v[i].y); restore(v[i].z, good_v[i].z);
+    }
+    for (int e = 0; LEDGER && e < 4; ++e) restore(ledger[e], good_ledger[e]);
+};
+auto set_oscillators = [&](long long n) {
+    for (int l = 0; l < W; ++l) {
+        const double angle = model.omegas.data[lane_ + l] * (double(n) * exact_dt);
+        sine[l] = scalar(::sin(angle)); cosine[l] = scalar(::cos(angle));
+    }
+};
+auto turn_oscillators = [&]() __attribute__((always_inline)) {
+    if (!ACTUATED) return;
+    const real si = sine, co = cosine;
+    sine = si * turn_cosine + co * turn_sine;
+    cosine = co * turn_cosine - si * turn_sine;
+};
+"""
+
+OBSERVE = r"""
+Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
+Vec* const seen_v = (Vec*)(seen.seen_velocities.data + state_);
+real* const com = (real*)(seen.seen_centers.data + 3 * lane_);
+real* const energy = (real*)(seen.seen_energies.data + 8 * lane_);
+
+const mask before = stopped_lanes();
+const mask reason = diagnose() & ~before;
+const mask stopped = before | (reason != 0);
+const double now = double((long long)step * division_) * exact_dt;
+for (int l = 0; l < W; ++l) {
+    seen.seen_states.data[lane_ + l] = health[l] != 0 ? health[l] : (int)reason[l];
+    seen.seen_state_times.data[lane_ + l] = health[l] != 0 ? health_time[l] : now;
+}
+auto choose = [=](Vec good, Vec now) -> Vec {
+    return Vec{select(stopped, good.x, now.x), select(stopped, good.y, now.y),
+               select(stopped, good.z, now.z)};
+};
+
+real total_mass = zero, cx = zero, cy = zero, cz = zero, kinetic = zero, gravity = zero,
+     springs = zero, ground = zero;
+real accounts[4];
+for (int e = 0; LEDGER && e < 4; ++e) accounts[e] = ledger[e];
+for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
+for (int i = 0; i < M; ++i) {
+    const Vec f = row_force(x, i, sine, cosine);
+    Vec u = v[i];
+    Losses losses = {};
+    if (!EULER && step > 0) synchronise(u, f, w[i], x[i].z, losses);
+    enter(losses, v[i], u, w[i]);
+    const Vec a = seen_x[i] = choose(good_x[i], x[i]);
+    u = seen_v[i] = choose(good_v[i], u);
+    const real m = (zero + scalar(1)) / w[i];
+    total_mass += m;
+    cx += m * a.x; cy += m * a.y; cz += m * a.z;
+    kinetic += m * (u.x * u.x + u.y * u.y + u.z * u.z) * scalar(0.5);
+    gravity -= m * (a.x * gravity_x + a.y * gravity_y + a.z * gravity_z);
+    if (GROUND) ground += ground_force(a.z) * a.z * scalar(-0.5);
+}
+com[0] = cx / total_mass; com[1] = cy / total_mass; com[2] = cz / total_mass;
+if (LEDGER) {
+    if (ACTUATED && !EULER && step > 0) ledger[0] += power * FIRST_KICK;
+    for (int i = 0; i < M; ++i) {
+        const Vec a = seen_x[i];
+        for (int s = row[i]; s < row[i + 1]; ++s) {
+            const Vec b = seen_x[partner[s]];
+            springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z),
+                                     stiffness(s), stiffness_times_rest(s, sine, cosine));
+        }
+    }
+    energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;
+    for (int e = 0; e < 4; ++e) {
+        energy[4 + e] = select(stopped, good_ledger[e], ledger[e]);
+        ledger[e] = accounts[e];  // looking changes nothing
+    }
+}
+"""
