@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,8 @@ QUICK_STEPS = {
 }
 #: Steps so small that one robot costs more spring evaluations are left out.
 MOST_EVALUATIONS = 13_000_000
+#: Runs that take longer than so many seconds are timed only so often.
+LONG, LONG_ROUNDS = 0.1, 3
 #: Robots in a batch: enough for spring evaluations worth a measurement, and whole bundles of lanes.
 EVALUATIONS_WANTED, FEWEST, MOST = 10_000_000, 64, 1024
 
@@ -93,11 +95,11 @@ def step_name(dt: float) -> str:
     return f"{dt * 1e3:.3g} ms" if dt >= 1e-4 else f"{dt * 1e6:.3g} µs"
 
 
-def series_of(case: Case, precisions: Iterable[str] = ("float64", "float32")) -> list[Series]:
+def series_of(case: Case) -> list[Series]:
     """The ways to step that differ in a scene."""
     contact = ("chosen", "one") if case.scene.ground else ("none",)
     ways = [(name, s) for name in ("chin4", "leapfrog") for s in contact] + [("euler", "none")]
-    return [Series(name, precision, s) for precision in precisions for name, s in ways]
+    return [Series(name, real, s) for real in ("float64", "float32") for name, s in ways]
 
 
 def sweep(
@@ -106,9 +108,7 @@ def sweep(
     truth: Truth,
     *,
     steps: dict[str, tuple[float, ...]] = STEPS,
-    rounds: int = 3,
-    precisions: Iterable[str] = ("float64", "float32"),
-    advance: Callable[[], None] = lambda: None,
+    rounds: int = 5,
 ) -> tuple[list[Row], float]:
     """All rows of a scene, and the seconds that it took to compile its kernels.
 
@@ -116,24 +116,25 @@ def sweep(
     """
     runs = [
         (series, dt)
-        for series in series_of(case, precisions)
+        for series in series_of(case)
         for dt in steps[series.integrator]
         if evaluations(case, series, dt) <= MOST_EVALUATIONS
     ]
     started = time.perf_counter()
-    for series in series_of(case, precisions):
+    for series in series_of(case):
         simulate(case.batch(FEWEST), case, series, 1e-3).run(1e-3)
     compiling = time.perf_counter() - started
     rows, walls = {}, {run: [] for run in runs}
-    for _ in range(rounds):
+    for number in range(rounds):
         for run in runs:
+            if number >= LONG_ROUNDS and walls[run][0] * _robots(case, *run) > LONG:
+                continue
             series, dt = run
             simulation = simulate(case.batch(_robots(case, series, dt)), case, series, dt)
             result = simulation.run(case.duration)
             walls[run].append(result.wall_time / len(result))
             if run not in rows:
                 rows[run] = case.errors(result, truth), int(simulation.contact_substeps[0])
-            advance()
     return [
         Row(
             scene=name,

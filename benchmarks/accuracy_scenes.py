@@ -350,7 +350,7 @@ def _cases() -> dict[str, Case]:
             judged=9,
         ),
         "lattice": Case(
-            title="breathing lattice lands on a corner",
+            title="lattice lands on a corner",
             robot=breathing_lattice(),
             scene=smooth,
             duration=0.5,

@@ -165,7 +165,7 @@ def _legend(figure, image) -> None:
     figure.text(
         0.782,
         0.076,
-        "unstable: stopped by its Status,\nor half as much energy again",
+        "unstable: stopped by its Status,\nor three times the energy",
         fontsize=8.6,
         va="center",
         linespacing=1.3,

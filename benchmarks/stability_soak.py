@@ -15,12 +15,12 @@ import numpy as np
 from stability_garbage import garbage, healthy
 
 import warp_springs as ws
-from warp_springs.kernels.lanes import CHECK_EVERY
 
 __all__ = ["MODES", "WORLDS", "Report", "soak"]
 
 CHUNK = 500
 FRAMES = 5
+CHECKED = 64  # steps between two looks at a robot's health
 #: precision, step, simulated time [s]; every chunk runs in each of them.
 MODES = (
     ("float64", 1e-4, 0.0256),
@@ -164,13 +164,13 @@ def _bits(result: ws.Result, robot: int) -> tuple[bytes, ...]:
 def _bounded(robot: ws.Robot, result: ws.Result, index: int, step: float) -> bool:
     """Whether all that is shown is finite, and no mass went further than the speed limit lets it.
 
-    A check looks at what the 64 steps since the last one did, so the last ones may not have been
-    looked at; and where a position is a large number, a thousandth of it is rounding.
+    The steps since the last look at its health count once more, and where a position is a large
+    number, a thousandth of it is rounding.
     """
     frames, velocities = result.frames(index), result.velocities(index)
     if not (np.isfinite(frames).all() and np.isfinite(velocities).all()):
         return False
-    reach = ws.Limits().speed * (result.end_time + CHECK_EVERY * step)
+    reach = ws.Limits().speed * (result.end_time + CHECKED * step)
     with np.errstate(over="ignore"):
         way = np.linalg.norm(frames - robot.positions, axis=-1)
         return bool((way <= reach + 1e-3 * np.abs(robot.positions).max()).all())

@@ -121,6 +121,7 @@ class Batch:
         arrays: The flat buffers of ``PACKED``, by name, on 64-byte boundaries.
         substeps: Contact sub-steps of each robot, shape (N,).
         levels: Halvings of the step of the run for each robot, shape (N,).
+        rounding: Energy that rounding alone may give each robot [J], shape (N,).
     """
 
     def __init__(self, robots: Sequence[Robot], scene: Scene, method: Method) -> None:
@@ -131,6 +132,7 @@ class Batch:
         self.groups: list[Group] = []
         self.substeps = np.ones(len(robots), np.int64)
         self.levels = np.zeros(len(robots), np.int64)
+        self.rounding = np.zeros(len(robots))
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
 
         # An absurd robot may overflow here; its status will say so.
@@ -222,11 +224,16 @@ class Batch:
             cast = values.astype(dtype_of(name, method.precision), copy=False)
             invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
+        # A stiffness that vanishes would be divided by.
+        vanished = fields["stiffness"].astype(method.precision) == 0.0
+        invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
         longest = longest_springs(strip)
+        elastic = largest(fields["stiffness"], strip.counts) * strip.counts * longest**2
+        self.rounding[strip.ids] = np.finfo(method.precision).eps * elastic
         reach = np.where(longest > 0.0, method.limits.stretch * longest, np.inf)
         for name, values in {
             "reaches2": reach**2,
-            "states": method.birth(strip, levels, invalid),
+            "states": method.birth(strip, self._scene, levels, invalid),
         }.items():
             self._append(
                 name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)

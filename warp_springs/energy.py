@@ -53,3 +53,15 @@ class Energy:
         """Change of the total since the first frame, less the work, plus the losses, (N, F)."""
         with np.errstate(invalid="ignore"):
             return self.total - self.total[:, :1] - self.work + self.losses
+
+    @property
+    def gain(self) -> np.ndarray:
+        """Energy from nowhere so far, as a part of the energy that came from somewhere, (N, F).
+
+        The residual over what the robot held at the first frame (without its height), the height
+        it lost since, and the work of its springs. 0.1 is a coarse step, 1 an explosion.
+        """
+        held = self.kinetic[:, :1] + self.spring[:, :1] + self.ground[:, :1]
+        fall = self.gravity[:, :1] - np.minimum.accumulate(self.gravity, axis=1)
+        given = held + fall + np.maximum.accumulate(np.abs(self.work), axis=1)
+        return np.maximum(self.residual, 0.0) / np.maximum(given, np.finfo(float).tiny)

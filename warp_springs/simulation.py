@@ -19,7 +19,7 @@ from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.slices import Tape, cut, run_all
-from warp_springs.stability import Limits
+from warp_springs.stability import Limits, Status
 from warp_springs.variants import Variants
 
 __all__ = ["Simulation"]
@@ -191,15 +191,28 @@ class Simulation:
         steps = first + np.rint(np.arange(count) / (fps * self.dt)).astype(np.int64)
         return np.minimum(steps, last).tolist()
 
+    def _find_gains(self, energy: Energy, times, status, stopped_at) -> None:
+        """Mark healthy robots that gained energy from nowhere, with the time it was first seen."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            seen = energy.gain > self.limits.gain
+            seen &= energy.residual > self._batch.rounding[:, None]
+        found = (status == Status.OK) & seen.any(axis=1)
+        status[found] = Status.ENERGY
+        stopped_at[found] = times[np.argmax(seen[found], axis=1)]
+
     def _result(self, first, frame_steps, recorded, tapes, wall_time: float) -> Result:
         slots, buffers = self._batch.slots, self._buffers
         lanes = slots.lane_indices(slice(None), 1)[:, 0]
         centers = slots.lane_indices(slice(None), 3)
         status = buffers["seen_states"][lanes].astype(np.int64)
         stopped_at = buffers["seen_state_times"][lanes]
+        energy = _energy(tapes, len(self.robots))
         # Steps before a robot was stopped count; each is of the robot's own size.
         until = np.where(status == 0, self.time, np.clip(stopped_at, first * self.dt, self.time))
         steps = np.rint((until - first * self.dt) / self.robot_dt).astype(np.int64)
+        times = np.array(frame_steps, np.float64) * self.dt
+        if energy is not None:
+            self._find_gains(energy, times, status, stopped_at)
         return Result(
             robots=self.robots,
             scene=self.scene,
@@ -213,9 +226,9 @@ class Simulation:
             status=status,
             status_time=np.where(status == 0, np.nan, stopped_at),
             center_of_mass=buffers["seen_centers"][centers].astype(np.float64),
-            times=np.array(frame_steps, np.float64) * self.dt,
+            times=times,
             recorded=tuple(recorded.tolist()),
-            energy=_energy(tapes, len(self.robots)),
+            energy=energy,
             spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
             _slots=slots,

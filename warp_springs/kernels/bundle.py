@@ -131,10 +131,15 @@ auto diagnose = [=]() -> mask {
     const real limit2 = zero + speed_limit * speed_limit;
     real poison = zero;
     mask fast = zero > zero, stretched = fast, deep = fast;
+    // Whoever was shot away and braked since the last check shows by the way it went.
+    const scalar way = speed_limit * dt * scalar(CHECK_EVERY);
+    const real way2 = zero + way * way;
     for (int i = 0; i < M; ++i) {
         const Vec a = x[i], u = v[i];
         poison += (a.x + a.y + a.z + u.x + u.y + u.z) * scalar(0);
+        const Vec d = a - good_x[i];
         fast |= u.x * u.x + u.y * u.y + u.z * u.z > limit2;
+        fast |= d.x * d.x + d.y * d.y + d.z * d.z > way2;
         if (GROUND) deep |= a.z < -depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];

@@ -107,12 +107,19 @@ _STEPS = r"""
 const long long past = (long long)last_step * division_;
 prepare();
 begin();
+bool gone = !any(~stopped_lanes());  // nobody is left to step
 for (long long n = (long long)first_step * division_; n < past; ++n) {
     if (n % CHECK_EVERY == 0) {
         end();
         check(n);
         begin();
+        gone = !any(~stopped_lanes());
         if (ACTUATED) set_oscillators(n);
+    }
+    if (gone) {
+        turn_oscillators();
+        if (CHIN4) turn_oscillators();
+        continue;
     }
     const bool start = n == 0;
     const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
@@ -154,8 +161,8 @@ def kernels(features: Features) -> Kernels:
         state: State,
         scratch: wp.array(dtype=real),
         bundle: int,
-        first_step: int,
-        last_step: int,
+        first_step: wp.int64,
+        last_step: wp.int64,
     ): ...
 
     @wp.func_native(common + OBSERVE)
@@ -164,7 +171,7 @@ def kernels(features: Features) -> Kernels:
         state: State,
         scratch: wp.array(dtype=real),
         bundle: int,
-        step: int,
+        step: wp.int64,
         seen: Seen,
     ): ...
 
@@ -174,8 +181,8 @@ def kernels(features: Features) -> Kernels:
         state: State,
         scratch: wp.array(dtype=real),
         first_bundle: int,
-        first_step: int,
-        last_step: int,
+        first_step: wp.int64,
+        last_step: wp.int64,
     ):
         advance_bundle(model, state, scratch, first_bundle + wp.tid(), first_step, last_step)
 
@@ -185,7 +192,7 @@ def kernels(features: Features) -> Kernels:
         state: State,
         scratch: wp.array(dtype=real),
         which: wp.array(dtype=wp.int32),
-        step: int,
+        step: wp.int64,
         # outputs
         seen: Seen,
     ):
