@@ -130,7 +130,7 @@ class Trial:
         velocities = self._kicked(velocities, self._spring_forces(), self._closing_kick)
         if self._friction == "coulomb":
             impulse = self._normal_forces() / self.masses * self._closing_kick
-            self._rub(velocities, impulse, holds_only=True)
+            self._rub(velocities, impulse, np.zeros_like(impulse))
         return velocities
 
     # What acts on a mass.
@@ -160,15 +160,18 @@ class Trial:
         scale = max(value, threshold, np.finfo(float).tiny)
         self.margin = min(self.margin, abs(value - threshold) / scale)
 
-    def _rub(self, velocities, impulse, holds_only=False):
-        """Coulomb friction in place: `impulse` is the normal impulse per mass [m/s], (M,)."""
+    def _rub(self, velocities, hold, impulse):
+        """Coulomb friction in place, by normal impulses per mass [m/s], (M,).
+
+        `hold` may stop a mass, `impulse` slows one that is not stopped.
+        """
         ground = self.scene.ground
-        for i in np.flatnonzero(impulse > 0.0):
+        for i in np.flatnonzero(hold > 0.0):
             slip = np.hypot(*velocities[i, XY])
-            self._note(slip, ground.static_friction * impulse[i])
-            if slip <= ground.static_friction * impulse[i]:
+            self._note(slip, ground.static_friction * hold[i])
+            if slip <= ground.static_friction * hold[i]:
                 velocities[i, XY] = 0.0
-            elif not holds_only:
+            elif impulse[i] > 0.0:
                 keep = 1.0 - ground.kinetic_friction * impulse[i] / slip
                 velocities[i, XY] *= max(0.0, keep)
 
@@ -197,7 +200,7 @@ class Trial:
         velocities = velocities + forces / self.masses[:, None] * dt
         impulse = self._normal_forces() / self.masses * dt
         if self._friction == "coulomb":
-            self._rub(velocities, impulse)
+            self._rub(velocities, impulse, impulse)
         velocities[:, Z] += impulse
         velocities = self._dragged(self._damped(velocities, dt), dt)
         self._state = velocities
@@ -209,14 +212,15 @@ class Trial:
     def _leapfrog(self):
         begins = self.steps == 0
         self._lossy_kick(self._spring_forces(), self.dt / 2 if begins else self.dt, begins)
-        self._slide(self._fall())
+        impulse = self._fall()
+        self._slide(impulse, impulse)
 
     def _chin4(self):
         """Chin's 4A: the middle kick takes the forces a little further along the acceleration."""
         dt, begins = self.dt, self.steps == 0
         self._lossy_kick(self._spring_forces(), dt / 6 if begins else dt / 3, begins)
         first = self._fall()
-        self._slide(first * 2 / 3)  # after a third of the step's kicks, two thirds of the friction
+        self._slide(first * 2 / 3, first)  # after a third of the step's kicks
 
         middle = self.time + dt / 2
         forces = spring_forces(self.robot, self.positions, middle)
@@ -224,7 +228,7 @@ class Trial:
         forces = spring_forces(self.robot, self.positions + shift, middle)
         self._lossy_kick(forces, dt * 2 / 3, begins=False)
         second = self._fall()
-        self._slide(first / 3 + second)
+        self._slide(np.where(second > 0.0, first / 3 + second, 0.0), second)
 
     def _with_weight(self, forces):
         """`forces` and the weight, but for its vertical part where that belongs to the drift."""
@@ -250,11 +254,14 @@ class Trial:
         velocities = self._kicked(velocities, forces, duration)
         self._state = self._damped(self._dragged(velocities, half), half)
 
-    def _slide(self, impulse):
-        """Horizontal drift, after the friction of a normal impulse per mass [m/s], (M,)."""
+    def _slide(self, hold, impulse):
+        """Friction, then the horizontal drift: what slides moves by the mean of two velocities."""
+        mean = self._state[:, XY].copy()
         if self._friction == "coulomb":
-            self._rub(self._state, impulse)
-        self.positions[:, XY] += self._state[:, XY] * self._span
+            self._rub(self._state, hold, impulse)
+            slides = self._state[:, XY].any(axis=1)[:, None]
+            mean = np.where(slides, (mean + self._state[:, XY]) / 2, 0.0)
+        self.positions[:, XY] += mean * self._span
 
     def _fall(self):
         """Vertical drift; returns the ground's impulse per mass [m/s], (M,)."""

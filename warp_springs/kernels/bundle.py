@@ -100,6 +100,18 @@ auto enter = [&](const Losses& losses, Vec before, Vec after, real w)
     if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
     if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
 };
+// A mass that slides is kicked, then rubbed; one that sticks is both at once, and friction takes
+// back what the kick gave.
+auto enter_step = [&](const Losses& losses, const Losses& rubbed, Vec before, Vec kicked, Vec after,
+                      real w) __attribute__((always_inline)) {
+    if (!LEDGER) return;
+    const mask slides = (after.x != zero) | (after.y != zero);
+    auto choose = [=](Vec a, Vec b) -> Vec {
+        return Vec{select(slides, a.x, b.x), select(slides, a.y, b.y), a.z};
+    };
+    enter(losses, before, choose(kicked, after), w);
+    enter(rubbed, choose(kicked, before), after, w);
+};
 
 auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];

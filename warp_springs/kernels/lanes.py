@@ -68,11 +68,12 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         if (!start) lose_before(u, w[i], losses);
         kick(u, f, w[i], a.z, time, losses);
         lose_after(u, w[i], losses);
-        const real rise = u.z;  // at the end of the kick: the drift changes it
+        const Vec kicked = u;
+        Losses rubbed = {};
         real rest = CHIN4 && last ? left_over[i] : zero;
-        drift(a, u, w[i], substeps, rest, last, losses);
+        drift(a, u, w[i], substeps, rest, last, rubbed);
         if (CHIN4 && !last) left_over[i] = rest;
-        enter(losses, before, Vec{u.x, u.y, rise}, w[i]);
+        enter_step(losses, rubbed, before, kicked, Vec{u.x, u.y, kicked.z}, w[i]);
         x[i] = a; v[i] = u;
     }
 };

@@ -118,13 +118,14 @@ auto ground_force = [=](real z) __attribute__((always_inline)) -> real {
     return select(z < zero, z * -ground_stiffness, zero);
 };
 
-// Coulomb's law for one step: a normal impulse j (per unit of mass) stops a tangential velocity
-// up to mu_s j and shortens a larger one by mu_k j along its own direction.
-auto coulomb = [=](real& ux, real& uy, real j, scalar kinetic) __attribute__((always_inline)) {
+// Coulomb's law for one step: a normal impulse `hold` (per unit of mass) stops a tangential
+// velocity up to mu_s hold, and an impulse j shortens a larger one by mu_k j along its direction.
+auto coulomb = [=](real& ux, real& uy, real hold, real j, scalar kinetic)
+        __attribute__((always_inline)) {
     real speed = square_root(ux * ux + uy * uy);
     real left = scalar(1) - kinetic * j / select(speed > zero, speed, zero + scalar(1));
     left = select(left > zero, left, zero);
-    real factor = select((j > zero) & (speed <= static_friction * j), zero, left);
+    real factor = select((hold > zero) & (speed <= static_friction * hold), zero, left);
     ux *= factor; uy *= factor;
 };
 
@@ -191,11 +192,11 @@ auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__(
     drag_flow(v, w, time);
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
-auto rub = [=](Vec& v, real impulse, Losses& losses, scalar kinetic)
+auto rub = [=](Vec& v, real hold, real impulse, Losses& losses, scalar kinetic)
         __attribute__((always_inline)) {
     if (!COULOMB) return;
     const Vec before = v;
-    coulomb(v.x, v.y, impulse, kinetic);
+    coulomb(v.x, v.y, hold, impulse, kinetic);
     if (LEDGER) losses.friction = losses.friction + (before - v);
 };
 // The classroom's friction belongs to the kick, since it works on the force.
@@ -220,9 +221,9 @@ auto lose_after = [=](Vec& v, real w, Losses& losses) __attribute__((always_inli
 
 // A mass in free flight follows its parabola; where the parabola's ends are not both above the
 // ground, the contact flow takes over. Friction acts once a drift, between the kick and the drift,
-// so that a mass that sticks does not move at all. The impulse it may use is the drift's own, in
-// proportion to the kick before it: the first drift of a chin4 step, after a third of the step's
-// kicks, leaves a third of its impulse to the second.
+// so that a mass that sticks does not move at all. What slides is slowed by the drift's own
+// impulse. What sticks is held in proportion to the kick before the drift: the first drift of a
+// chin4 step, after a third of the step's kicks, leaves a third of its hold to the second.
 auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, real& left_over,
                       bool last, Losses& losses) __attribute__((always_inline)) {
     z = x.z + (v.z + gravity_z * span * scalar(0.5)) * span;
@@ -234,22 +235,28 @@ auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, rea
         z = select(touching, z_contact, z);
         u = select(touching, u_contact, u);
         impulse = select(touching, impulse, zero);
+        real hold = impulse;
         if (CHIN4) {
-            const real usable = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
-            left_over = impulse - usable;
-            impulse = usable;
+            hold = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
+            left_over = impulse - hold;
+            hold = select(impulse > zero, hold, zero);
         }
-        rub(v, impulse, losses, kinetic_friction);
-    } else if (CHIN4) {
-        if (last && any(left_over > zero)) rub(v, left_over, losses, kinetic_friction);
-        left_over = zero;
-    }
+        rub(v, hold, impulse, losses, kinetic_friction);
+    } else if (CHIN4) left_over = zero;
 };
+// Friction slows a sliding mass evenly during the drift, which therefore moves it with the mean of
+// the velocities before and after: second order.
 auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool last,
                  Losses& losses) __attribute__((always_inline)) {
     real z = x.z + v.z * span, u = v.z;
+    Vec mean = v;
     if (GROUND) touch_down(x, v, z, u, w, substeps, left_over, last, losses);
-    x.x += v.x * span; x.y += v.y * span; x.z = z;
+    if (COULOMB) {
+        const mask slides = (v.x != zero) | (v.y != zero);
+        mean.x = select(slides, (mean.x + v.x) * scalar(0.5), zero);
+        mean.y = select(slides, (mean.y + v.y) * scalar(0.5), zero);
+    }
+    x.x += mean.x * span; x.y += mean.y * span; x.z = z;
     v.z = u;
 };
 
@@ -260,7 +267,7 @@ auto synchronise = [=](Vec& v, Vec f, real w, real z, Losses& losses)
         __attribute__((always_inline)) {
     lose_before(v, w, losses);
     kick(v, f, w, z, FIRST_KICK, losses);
-    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, losses, scalar(0));
+    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, zero, losses, scalar(0));
 };
 
 // Work of a loss that changed the velocity of a mass by -lost while it went from `before` to
@@ -283,7 +290,7 @@ auto euler_step = [=](Vec& x, Vec& v, Vec f, real w, Losses& losses)
         v.x += a.x * dt; v.y += a.y * dt; v.z += a.z * dt;
         if (LEDGER) losses.friction = losses.friction + (free - v);
     } else v = free;
-    if (GROUND) rub(v, push * dt, losses, kinetic_friction);
+    if (GROUND) rub(v, push * dt, push * dt, losses, kinetic_friction);
     damp(v, losses);
     damp(v, losses);
     slow_down(v, w, dt, losses);
