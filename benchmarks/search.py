@@ -4,8 +4,8 @@
     python benchmarks/search.py --generations 15          # a smaller budget, about 2 minutes
     python benchmarks/search.py --preset cube --json search.json
 
-Every search keeps its nine best; they are simulated again, at half the time step in float64 and from
-perturbed starts. The table shows the fittest who survives both, its fitness at half the step, and
+Every search keeps its nine best; they are simulated again, at half the time step in float64 and
+from perturbed starts. The table shows the fittest who survives both, its fitness at half the step, and
 its lead over the champion of random search with the same seed.
 """
 

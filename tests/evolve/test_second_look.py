@@ -54,7 +54,7 @@ def test_a_healthy_walker_is_crowned(tmp_path):
     run, finalists = crowned(load("cube", SMALL), tmp_path / "healthy")
     champion = finalists[0]
     assert champion.survives and 0.2 < champion.fitness < 0.5
-    assert champion.halved_kept > 0.9 and champion.perturbed_kept > 0.85
+    assert champion.halved_kept >= 0.8 and champion.perturbed_kept >= 0.8  # the thresholds
     assert verdict(finalists, run.config).endswith(": survives")
 
 
@@ -162,5 +162,6 @@ def test_nobody_survives_without_a_fitness_or_when_stopped():
     wild = [robots[0].replace(stiffness=1e12), robots[1]]
     look = Evaluator(config).second_look(wild, np.array([0.1, 0.0]))
     assert np.isnan(look.halved[0]) and np.isnan(look.perturbed[0])
-    assert look.halved[1] == pytest.approx(Evaluator(config)([wild[1]]).fitness[0], rel=0.2)
+    fine = load("cube", TINY | {"simulation.dt": config.simulation.dt / 2})
+    assert look.halved[1] == Evaluator(fine)([wild[1]]).fitness[0]
     assert not look.survives.any()
