@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import warp_springs as ws
 from evolve.config import RunConfig, SecondLookConfig
