@@ -5,8 +5,8 @@
     python benchmarks/search.py --preset cube --json search.json
 
 Every search keeps its nine best; they are simulated again, at half the time step in float64 and
-from perturbed starts. The table shows the fittest who survives both, its fitness at half the step, and
-its lead over the champion of random search with the same seed.
+from perturbed starts. The table shows the fittest who survives both, its fitness at half the step,
+and its lead over the champion of random search with the same seed.
 """
 
 from __future__ import annotations
