@@ -88,7 +88,7 @@ class Strip:
         return np.tile(self.springs, (len(self.ids), 1)) if self.shared else self.springs
 
 
-def sort_rows(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]:
     """Springs in rows by their lower mass.
 
     Returns:
@@ -101,7 +101,8 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     mass_start, spring_start = np.cumsum(masses) - masses, np.cumsum(counts) - counts
     lower, higher = np.sort(strip.springs, axis=1).T
     lower = lower + np.repeat(mass_start, counts)
-    order = np.argsort(lower, kind="stable")
+    in_rows = (lower[1:] >= lower[:-1]).all()  # as the shapes make them: nothing to copy
+    order = slice(None) if in_rows and not strip.shared else np.argsort(lower, kind="stable")
     partner = higher[order]
 
     ends = np.cumsum(np.bincount(lower, minlength=masses.sum()))  # where the row of a mass ends
@@ -115,18 +116,23 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return order, row.astype(np.int32), partner.astype(np.int32)
 
 
-def coefficients(fields: dict[str, np.ndarray], order: np.ndarray, actuated: bool) -> np.ndarray:
+def coefficients(
+    fields: dict[str, np.ndarray], order: np.ndarray | slice, actuated: bool
+) -> np.ndarray:
     """Coefficients of the sorted springs: k and q = k L0, shape (total, 2), or, if they breathe,
     k, qa, qs, qc with q(t) = qa + qs sin(wt) + qc cos(wt), shape (total, 4).
 
     From L0(t) = a + b sin(wt + c) = a + (b cos c) sin(wt) + (b sin c) cos(wt).
     """
-    k, rest = fields["stiffness"][order], fields["rest_length"][order]
-    columns = [k, k * rest]
+    k = fields["stiffness"][order]
+    table = np.empty((len(k), 4 if actuated else 2))
+    table[:, 0] = k
+    np.multiply(k, fields["rest_length"][order], out=table[:, 1])
     if actuated:
-        b, c = fields["amplitude"][order], fields["phase"][order]
-        columns += [k * b * np.cos(c), k * b * np.sin(c)]
-    return np.stack(columns, axis=1)
+        kb, c = k * fields["amplitude"][order], fields["phase"][order]
+        np.multiply(kb, np.cos(c), out=table[:, 2])
+        np.multiply(kb, np.sin(c), out=table[:, 3])
+    return table
 
 
 def longest_springs(strip: Strip) -> np.ndarray:
