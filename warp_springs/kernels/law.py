@@ -15,7 +15,7 @@ A layout puts in front of ``LAW`` a dialect that defines
 and the constants of ``CONSTANTS`` as ``const scalar``, and the compile-time ``const bool`` of the
 features. What a scene lacks is a ``false`` there, and the compiler drops its code.
 
-Units are SI; forces are per robot mass point; ``w`` is the inverse of a mass [1/kg].
+Units are SI; ``w`` is the inverse of a mass [1/kg].
 """
 
 from __future__ import annotations
