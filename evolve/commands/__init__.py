@@ -1,0 +1,1 @@
+"""The commands of ``evolve``: each a class whose docstring is its help."""

@@ -1,0 +1,90 @@
+"""``evolve report``, ``evolve export`` and ``evolve digest``: what came of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from evolve.commands.shared import Folder, print_written
+from evolve.errors import RunError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["Digest", "Export", "Report"]
+
+
+@dataclass(frozen=True)
+class Report:
+    """Draw the plots of a run and print its parameters and results, also while it is going on.
+
+    Writes learning_curve.png and dot_plot.png to its folder.
+    """
+
+    directory: Folder
+    """Folder of the run."""
+
+    def __call__(self, console: Console) -> int:
+        """Draw, and print the table."""
+        from evolve.report import draw, table
+        from evolve.run import Run as RunFolder
+
+        run = RunFolder.open(self.directory)
+        paths = draw(run)
+        console.print(table(run), highlight=False)
+        print_written(paths)
+        return 0
+
+
+@dataclass(frozen=True)
+class Export:
+    """Simulate the best robots of a run again and write them as animations.
+
+    Writes champion.usdc, zoo.usdc with the best different individuals side by side, and zoo.png to
+    the folder of the run. The best are first simulated again, at half the time step in float64 and
+    from perturbed starts; the champion is the fittest who keeps its fitness there, and whoever
+    does not comes after all who do.
+    """
+
+    directory: Folder
+    """Folder of the run."""
+    best: Annotated[int, arg(metavar="N")] = 9
+    """How many robots the zoo has, 1 to 100."""
+
+    def __call__(self, console: Console) -> int:
+        """Look twice at the best, and write them."""
+        import warp_springs as ws
+        from evolve.export import export
+        from evolve.report import verdict
+        from evolve.run import Run as RunFolder
+
+        if not 1 <= self.best <= 100:
+            raise RunError(f"--best must be 1 to 100, not {self.best}")
+        run = RunFolder.open(self.directory)
+        ws.quiet()
+        finalists, paths = export(run, self.best)
+        print(verdict(finalists, run.config))
+        print_written(paths)
+        return 0
+
+
+@dataclass(frozen=True)
+class Digest:
+    """Print one hash of everything a run decided: genomes, scores, parents; not times.
+
+    Two runs of the same configuration on the same machine have the same digest, however often
+    they were interrupted and on however many cores.
+    """
+
+    directory: Folder
+    """Folder of the run."""
+
+    def __call__(self, console: Console) -> int:
+        """Print it."""
+        from evolve.run import Run as RunFolder
+
+        with RunFolder.open(self.directory).read() as store:
+            print(store.digest())
+        return 0

@@ -1,0 +1,69 @@
+"""What several commands share: their arguments, and words on the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from evolve import run as runs
+
+__all__ = ["INTERRUPTED", "Folder", "Whole", "evolve_to_the_end", "print_written"]
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+Folder = Annotated[Positional[Path], arg(metavar="DIR")]
+Whole = Annotated[int | None, arg(metavar="N", help_behavior_hint="")]
+
+
+def evolve_to_the_end(run: runs.Run, console: Console) -> int:
+    """Evolve a run to its end, or until Ctrl-C, with everything a person wants to see."""
+    import warp_springs as ws
+    from evolve.fitness import UNITS
+    from evolve.report import describe
+    from evolve.screen import Screen, interruptible
+
+    config = run.config
+    console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
+    for subject, words in [*describe(config), ("folder", str(run.directory))]:
+        console.print(f"[dim]{subject:<8}[/]{words}", highlight=False, soft_wrap=True)
+    ws.quiet()
+    screen = Screen(console, UNITS[config.task.fitness])
+    try:
+        with interruptible() as stopping, screen.showing(stopping):
+            complete = run.evolve(screen.update, stopping.is_set)
+        if complete:
+            _finish(run, console)
+            return 0
+    except KeyboardInterrupt:
+        pass
+    print(f"stopped; continue with: evolve resume {run.directory}")
+    return INTERRUPTED
+
+
+def _finish(run: runs.Run, console: Console) -> None:
+    """Crown the champion, write everything, and say what came of the run."""
+    from evolve.export import export
+    from evolve.report import draw, results, verdict
+
+    with console.status("looking twice at the best, writing animations and plots"):
+        finalists, animations = export(run)
+        plots = draw(run)
+    console.print(f"[bold]{verdict(finalists, run.config)}[/]", highlight=False, soft_wrap=True)
+    with run.read() as store:
+        facts = dict(results(store, run.config))
+    print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")
+    print_written([run.record_path, *animations, *plots])
+
+
+def print_written(paths: Sequence[Path]) -> None:
+    """Say which files were written."""
+    print("wrote")
+    for path in paths:
+        print(f"  {path}")

@@ -1,0 +1,1 @@
+"""The commands of ``warp-springs``: each a module with what it does and its own help."""
