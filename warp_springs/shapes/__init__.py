@@ -1,0 +1,10 @@
+"""Shapes: bodies to start from, each a `Robot` that stands on the ground z = 0.
+
+All are at rest and not actuated, and their springs have their initial lengths.
+"""
+
+from warp_springs.shapes.convex import octahedron, tetrahedron
+from warp_springs.shapes.scattered import random_lattice
+from warp_springs.shapes.voxels import cube, lattice, voxels
+
+__all__ = ["cube", "lattice", "octahedron", "random_lattice", "tetrahedron", "voxels"]
