@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,6 +90,34 @@ class Result:
             known = f"recorded: {list(self.recorded[:8])}" if self.recorded else "none was"
             raise ValueError(f"frames: robot {robot} was not recorded in this run ({known})")
         return self._frames[robot]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything into one ``.npz`` file and return its path.
+
+        Robots, scene, frames, the states at the end, energies, statuses, all to the last bit. The
+        layout is documented and versioned in ``warp_springs.io.results``. The file appears whole
+        or not at all.
+
+        Raises:
+            ValueError: The name does not end in ``.npz``.
+            TypeError: The scene or a robot holds what no file can keep, a function for example.
+            OSError: The file cannot be written.
+        """
+        from warp_springs.io.results import save_result
+
+        return save_result(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Result:
+        """Read a file that `save` wrote; frames stay on the disk until they are asked for.
+
+        Raises:
+            ValueError: It is no such file, it is damaged, or a newer version wrote it.
+            OSError: It cannot be read.
+        """
+        from warp_springs.io.results import load_result
+
+        return load_result(path)
 
     def _index(self, robot: int) -> int:
         count = len(self.robots)

@@ -1,1 +1,1 @@
-"""Files in and out: animations as OpenUSD."""
+"""Files in and out: results, and animations as OpenUSD."""
