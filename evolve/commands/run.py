@@ -37,7 +37,8 @@ class Run:
     population: Whole = None
     """How many robots are evaluated in each generation."""
     optimizer: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """genetic, hill_climber or random, with its own defaults."""
+    """genetic, cma, age_fitness, crowding, steady_state, nsga2, map_elites, hill_climber or random,
+    with its own defaults."""
     threads: Whole = None
     """Processor cores to use, otherwise all. Changes nothing but the time."""
     set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()

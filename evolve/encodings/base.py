@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes"]
+__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes", "folded"]
 
 Genomes = Any
 """A population of genomes. Only its encoding looks inside; everybody else may call `len`."""
@@ -68,10 +68,30 @@ class Encoding(Protocol):
         """One population from several."""
 
 
+def folded(genes: np.ndarray, circular: np.ndarray | bool = False) -> np.ndarray:
+    """Bring genes back into [0, 1]: those on a circle go round, the others are reflected."""
+    reflected = np.abs(genes - 2.0 * np.round(0.5 * genes))
+    return np.where(circular, genes - np.floor(genes), reflected).astype(genes.dtype)
+
+
 class ArrayGenomes:
-    """The housekeeping of encodings whose population is one float32 array (n, *genome_shape)."""
+    """The housekeeping of encodings whose population is one float32 array (n, *genome_shape).
+
+    Every gene lies in [0, 1].
+    """
 
     genome_shape: tuple[int, ...]
+    circular: np.ndarray | bool = False
+    """Which genes go round, such as phases; broadcast to the genome's shape."""
+
+    def to_vectors(self, genomes: np.ndarray) -> np.ndarray:
+        """The genes of each genome in one row, shape (n, D), float64."""
+        return genomes.reshape(len(genomes), -1).astype(np.float64)
+
+    def from_vectors(self, vectors: np.ndarray) -> np.ndarray:
+        """The genomes of rows of any real numbers, folded into [0, 1]."""
+        genes = np.asarray(vectors, np.float64).reshape(len(vectors), *self.genome_shape)
+        return folded(genes, self.circular).astype(np.float32)
 
     def take(self, genomes: np.ndarray, indices: np.ndarray) -> np.ndarray:
         """The genomes at `indices`, in that order."""

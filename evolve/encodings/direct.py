@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from evolve.encodings.base import ArrayGenomes, EncodingSettings
+from evolve.encodings.base import ArrayGenomes, EncodingSettings, folded
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -16,6 +16,7 @@ __all__ = ["DirectEncoding", "DirectSettings"]
 
 REST, AMPLITUDE, PHASE, STIFFNESS = range(4)
 """Rows of a genome."""
+ON_CIRCLE = np.arange(4) == PHASE
 
 
 class DirectSettings(EncodingSettings):
@@ -62,6 +63,7 @@ class DirectEncoding(ArrayGenomes):
         self.body = body
         self.settings = settings
         self.genome_shape = (4, body.n_springs)
+        self.circular = ON_CIRCLE[:, None]
         ends = body.positions[body.springs]
         self._middles = ends.mean(axis=1)
         self._reach = float(np.linalg.norm(np.ptp(self._middles, axis=0)))
@@ -88,7 +90,7 @@ class DirectEncoding(ArrayGenomes):
         shift = np.where(in_region[rows, None], shared[rows], shift) * kinds[rows]
         genes = genomes[rows, :, springs] + np.float32(self.settings.mutation_step) * shift
         mutants = genomes.copy()
-        mutants[rows, :, springs] = _within_bounds(genes)
+        mutants[rows, :, springs] = folded(genes, ON_CIRCLE)
         return mutants
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -143,11 +145,3 @@ class DirectEncoding(ArrayGenomes):
             normals[:, i, None] * (self._middles[:, i] - through[:, i, None]) for i in range(3)
         )
         return offsets > 0.0
-
-
-def _within_bounds(genes: np.ndarray) -> np.ndarray:
-    """Bring genes (K, 4) back into [0, 1]: phases go round, the others are reflected."""
-    folded = np.abs(genes - 2.0 * np.round(0.5 * genes))
-    phase = genes[:, PHASE]
-    folded[:, PHASE] = phase - np.floor(phase)
-    return folded

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 
 from evolve.encodings.base import Encoding, Genomes
 from evolve.scores import Scores
-from evolve.streams import Streams
+from evolve.streams import Role, Streams
 
 __all__ = ["NOBODY", "Candidates", "Individuals", "Optimizer", "OptimizerSettings", "Recall"]
 
@@ -163,6 +163,11 @@ class PopulationOptimizer(Optimizer):
     def __init__(self, encoding: Encoding, streams: Streams, settings: Any) -> None:
         super().__init__(encoding, streams, settings)
         self._survivors: Individuals | None = None
+
+    def _newcomers(self, n: int) -> tuple[Genomes, np.ndarray]:
+        """Unrelated genomes without parents, as `_ask` returns them."""
+        rng = self.streams(self.generation, Role.INITIAL)
+        return self.encoding.random(n, rng), np.full((n, 2), NOBODY)
 
     def _state(self) -> dict[str, np.ndarray]:
         ids = [] if self._survivors is None else self._survivors.ids

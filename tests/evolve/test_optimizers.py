@@ -5,10 +5,13 @@ import pytest
 
 from evolve.encodings import ArrayGenomes
 from evolve.optimizers import NOBODY, OPTIMIZERS, Individuals, Optimizer
+from evolve.optimizers.selection import SelectionSettings, select
 from evolve.scores import Scores
 from evolve.streams import Streams
 
 LEARNERS = [name for name in OPTIMIZERS if name != "random"]
+SETTINGS = {"steady_state": {"living": 20}, "map_elites": {"bins": (4, 4)}}
+"""What suits problems as small as these."""
 
 
 class Vectors(ArrayGenomes):
@@ -27,16 +30,24 @@ class Vectors(ArrayGenomes):
     def cross(self, a, b, rng):
         return np.where(rng.random(a.shape) < 0.5, a, b)
 
+    def distance(self, a, b):
+        return np.abs(a - b).mean(axis=1)
+
 
 def make(name: str, seed: int = 1, **settings) -> Optimizer:
     cls = OPTIMIZERS[name]
-    return cls(Vectors(), Streams(seed), cls.Settings(**settings))
+    return cls(Vectors(), Streams(seed), cls.Settings(**{**SETTINGS.get(name, {}), **settings}))
 
 
 def sphere(genomes: np.ndarray) -> Scores:
     """Higher is better, best at 0.3 everywhere; a corner of the space has no fitness."""
     fitness = -np.sum((genomes.astype(np.float64) - 0.3) ** 2, axis=1)
-    return Scores(fitness, status=(genomes[:, 0] > 0.9).astype(int))
+    descriptors = {
+        "energy": genomes[:, 1],
+        "displacement_x": 4.0 * genomes[:, 2] - 2.0,
+        "displacement_y": 4.0 * genomes[:, 3] - 2.0,
+    }
+    return Scores(fitness, (genomes[:, 0] > 0.9).astype(int), descriptors)
 
 
 def search(optimizer: Optimizer, generations: int, n: int = 40) -> list[Individuals]:
@@ -104,7 +115,7 @@ def test_parents_were_individuals_of_earlier_generations(name):
         parents = candidates.parents[candidates.parents != NOBODY]
         assert candidates.parents.shape == (30, 2)
         assert (parents >= 1).all() and (parents <= 30 * generation).all()
-        if generation and name != "random":
+        if generation and name not in ("random", "cma"):
             assert len(parents) >= 20
         optimizer.tell(candidates, sphere(candidates.genomes))
 
@@ -114,11 +125,13 @@ def test_a_population_without_any_fitness_is_survived(name):
     optimizer = make(name)
     for _ in range(3):
         candidates = optimizer.ask(10)
-        optimizer.tell(candidates, Scores(np.full(10, np.nan), np.ones(10)))
+        nothing = {key: np.full(10, np.nan) for key in sphere(candidates.genomes).descriptors}
+        optimizer.tell(candidates, Scores(np.full(10, np.nan), np.ones(10), nothing))
     assert optimizer.best_id == NOBODY and np.isnan(optimizer.best_fitness)
     assert optimizer.failures == 30
     candidates = optimizer.ask(10)
-    optimizer.tell(candidates, Scores(np.arange(10.0), np.zeros(10)))
+    found = {key: np.zeros(10) for key in nothing}
+    optimizer.tell(candidates, Scores(np.arange(10.0), np.zeros(10), found))
     assert optimizer.best_fitness == 9.0
 
 
@@ -138,6 +151,19 @@ def test_elites_stay_and_are_not_asked_for_again():
     better = optimizer.state()["survivors"][:5]
     assert set(better) <= set(best) | set(range(51, 101))
     assert np.count_nonzero(survivors <= 50) <= 5
+
+
+def test_one_hill_climber_moves_to_the_best_of_its_mutants():
+    optimizer = make("hill_climber", climbers=1)
+    search(optimizer, 1)
+    for _ in range(5):
+        at = optimizer._survivors
+        told = search(optimizer, 1)[0]
+        best = int(np.argmax(told.scores.worth))
+        better = told.scores.worth[best] >= at.scores.worth[0]
+        expected = told.ids[best] if better else at.ids[0]
+        np.testing.assert_array_equal(optimizer._survivors.ids, [expected])
+        assert (optimizer.ask(40).parents[:, 0] == expected).all()
 
 
 def test_hill_climbers_never_step_down():
@@ -160,3 +186,95 @@ def test_what_does_not_fit_is_refused():
         optimizer.tell(optimizer.ask(3), Scores(np.zeros(2), np.zeros(2)))
     with pytest.raises(ValueError, match=r"status must have the shape of fitness, \(2,\)"):
         Scores(np.zeros(2), np.zeros(3))
+
+
+@pytest.mark.parametrize("name", ["rank", "truncation", "tournament"])
+def test_selection_prefers_the_fit_as_its_settings_say(name):
+    settings = SelectionSettings(selection=name, pressure=1.8, truncation=0.1, tournament=3)
+    rng = np.random.default_rng(1)
+    drawn = select(settings, 50, (200_000,), rng)
+    share = np.bincount(drawn, minlength=50) / len(drawn)
+    k = np.arange(50)
+    expected = {
+        "rank": (1.8 - 1.6 * k / 49) / 50,
+        "truncation": np.where(k < 5, 0.2, 0.0),
+        "tournament": ((50 - k) ** 3 - (49 - k) ** 3) / 50.0**3,
+    }[name]
+    np.testing.assert_allclose(share, expected, atol=2e-3)
+
+
+def test_crowding_keeps_two_peaks_where_a_genetic_algorithm_keeps_one():
+    def peaks(genomes):
+        x = genomes.astype(np.float64)
+        apart = [np.sum((x - at) ** 2, axis=1) for at in (0.2, 0.8)]
+        return Scores(-np.minimum(*apart), np.zeros(len(x)))
+
+    kept = {}
+    for name in ("crowding", "genetic"):
+        optimizer = make(name)
+        for _ in range(60):
+            candidates = optimizer.ask(40)
+            optimizer.tell(candidates, peaks(candidates.genomes))
+        near = optimizer._survivors.genomes.mean(axis=1) < 0.5
+        kept[name] = min(near.sum(), (~near).sum())
+    assert kept["crowding"] >= 10 > kept["genetic"]
+
+
+def test_ages_are_those_of_the_oldest_ancestor():
+    optimizer, ages = make("age_fitness"), {NOBODY: -1}
+    for generation in range(8):
+        candidates = optimizer.ask(40)
+        for i, parents in zip(candidates.ids, candidates.parents, strict=True):
+            # Counted from birth: an ancestor grows older even when it left no trace.
+            oldest = [ages[p] for p in parents.tolist() if p != NOBODY]
+            ages[int(i)] = min(oldest) if oldest else generation
+        optimizer.tell(candidates, sphere(candidates.genomes))
+        born = np.array([ages[int(i)] for i in optimizer._survivors.ids])
+        np.testing.assert_array_equal(optimizer._ages, generation - born)
+    assert optimizer._ages.min() < 3 < optimizer._ages.max()
+
+
+def test_nsga2_spreads_along_the_front():
+    """Schaffer's problem: f1 = x^2 and f2 = (x - 1)^2; every x from 0 to 1 is a trade-off."""
+    optimizer = make("nsga2", objectives=("fitness", "-energy"))
+    for _ in range(60):
+        candidates = optimizer.ask(40)
+        x = candidates.genomes.astype(np.float64)
+        f1, f2 = (x**2).mean(axis=1), ((x - 1.0) ** 2).mean(axis=1)
+        optimizer.tell(candidates, Scores(-f1, np.zeros(40), {"energy": f2}))
+    first, second = -optimizer._survivors.scores.worth, optimizer._survivors.scores.descriptors
+    # On the front sqrt(f1) + sqrt(f2) = 1.
+    ideal = np.sqrt(first) + np.sqrt(second["energy"])
+    assert np.median(ideal) < 1.05
+    assert np.sqrt(first).min() < 0.25 and np.sqrt(first).max() > 0.75
+
+
+def test_what_cannot_be_an_objective_is_named():
+    with pytest.raises(ValueError, match="'-fun': there is no 'fun'; there are fitness, energy"):
+        search(make("nsga2", objectives=("fitness", "-fun")), 1)
+    with pytest.raises(ValueError, match="descriptor 'fun': there is none; there are energy"):
+        search(make("map_elites", descriptors=("fun", "energy")), 1)
+
+
+def test_map_elites_keeps_the_best_of_every_cell():
+    optimizer = make("map_elites")
+    everybody = search(optimizer, 12)
+    pool = optimizer._concatenate(*everybody)
+    cells, worth = np.full(len(pool), -1), pool.scores.worth
+    good = np.isfinite(worth)
+    cells[good] = optimizer.cells(optimizer._take(pool, np.flatnonzero(good)))
+    best = {c: worth[cells == c].max() for c in np.unique(cells[good])}
+    np.testing.assert_array_equal(optimizer.cells(optimizer._survivors), sorted(best))
+    np.testing.assert_array_equal(
+        optimizer._survivors.scores.worth, [best[c] for c in sorted(best)]
+    )
+
+
+def test_cma_draws_from_its_own_stream():
+    before = np.random.get_state()[1].copy()  # noqa: NPY002 (it must stay untouched)
+    a, b = make("cma"), make("cma")
+    search(a, 5), search(b, 5)
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+    np.testing.assert_array_equal(a.ask(9).genomes, b.ask(9).genomes)
+    with pytest.raises(ValueError, match="no genomes of a fixed number of real genes"):
+        OPTIMIZERS["cma"](object(), Streams(1), OPTIMIZERS["cma"].Settings())
