@@ -10,8 +10,9 @@ ws.export_usd(result, "cube.usdc")
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
-from warp_springs import shapes
+from warp_springs import materials, shapes
 from warp_springs.energy import Energy
+from warp_springs.materials import Material
 from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Ground, Scene, damping_rate
@@ -24,6 +25,7 @@ __all__ = [
     "Energy",
     "Ground",
     "Limits",
+    "Material",
     "Result",
     "Robot",
     "Scene",
@@ -32,6 +34,7 @@ __all__ = [
     "Variants",
     "damping_rate",
     "export_usd",
+    "materials",
     "plots",
     "quiet",
     "render",

@@ -21,6 +21,7 @@ from warp_springs.geometry import FloatArray, IntArray, spring_lengths
 __all__ = [
     "FIELDS",
     "Field",
+    "check_labels",
     "checked",
     "freeze",
     "is_frozen",
@@ -39,14 +40,15 @@ class Field:
     row: tuple[int, ...]
     """Shape of one row."""
     rule: str
-    """Values allowed: ``"positive"``, ``"non-negative"``, ``"finite"`` or ``"index"``."""
+    """Values allowed: ``"positive"``, ``"non-negative"``, ``"finite"``, ``"index"``, ``"label"``
+    (-1 for none, or a row of the table of materials) or ``"table"`` (that table)."""
     unit: str
     """SI unit, empty for indices."""
 
     @cached_property
     def dtype(self) -> np.dtype:
-        """Element type: int32 for indices, float64 for everything else."""
-        return _INT32 if self.rule == "index" else _FLOAT64
+        """Element type: int32 for indices and labels, float64 for everything else."""
+        return _INT32 if self.rule in ("index", "label") else _FLOAT64
 
 
 _INT32, _FLOAT64 = np.dtype(np.int32), np.dtype(np.float64)
@@ -62,6 +64,8 @@ FIELDS: dict[str, Field] = {
     "phase": Field("spring", (), "finite", "rad"),
     "omega": Field("robot", (), "finite", "rad/s"),
     "faces": Field("face", (3,), "index", ""),
+    "material": Field("spring", (), "label", ""),
+    "materials": Field("robot", (), "table", ""),
 }
 """The fields of a robot, in the order in which `Robot` takes and keeps them."""
 
@@ -72,6 +76,8 @@ _LOW_ENOUGH: dict[str, Callable[[Any], Any]] = {
     "non-negative": lambda low: low >= 0.0,
     "finite": lambda low: low > -math.inf,
 }
+_FILLS = {"velocities": 0, "amplitude": 0, "phase": 0, "faces": 0, "material": -1}
+"""What fills the fields that may be left out."""
 _ALLOWED = {
     "positive": "must be finite and greater than 0",
     "non-negative": "must be finite and at least 0",
@@ -108,12 +114,16 @@ def settled(given: Mapping[str, Any], to_check: Container[str]) -> dict[str, Any
         elif value is None and name == "rest_length":
             initial = spring_lengths(done["positions"], done["springs"])
             done[name] = checked(name, initial, initial.shape)
-        elif value is None and name in ("velocities", "amplitude", "phase", "faces"):
-            done[name] = _filled((counts[field.per] or 0, *field.row), 0, field.dtype)
+        elif name == "materials":
+            done[name] = _checked_table(value)
+        elif value is None and name in _FILLS:
+            done[name] = _filled((counts[field.per] or 0, *field.row), _FILLS[name], field.dtype)
         else:
             done[name] = checked(name, value, (counts[field.per], *field.row))
     if "faces" in to_check:
         _check_indices("faces", done["faces"], counts["mass"])
+    if "material" in to_check or "materials" in to_check:
+        check_labels(done["material"], len(done["materials"]))
     return done
 
 
@@ -129,18 +139,20 @@ def checked(
         ValueError: The value is no array of numbers, its shape or one of its values is wrong.
     """
     field = FIELDS[name]
-    if spread and type(value) is float and len(shape) == 1:
+    if spread and type(value) is float and len(shape) == 1 and field.rule in _LOW_ENOUGH:
         return _filled(shape, _checked_number(name, value), field.dtype)
     ready = is_frozen(value, field.dtype)
     array = value if ready else _converted(name, value, field)
     if spread and array.ndim == 0 and len(shape) == 1:
-        return _filled(shape, _checked_number(name, float(array)), field.dtype)
+        number = float(array)
+        good = _checked_number(name, number) if field.rule in _LOW_ENOUGH else number
+        return _filled(shape, good, field.dtype)
     if array.shape == (0,) and shape[:1] in ((0,), (None,)):
         array = array.reshape(0, *shape[1:])  # an empty list does not know the shape of its rows
     expected = (array.shape[:1] + shape[1:]) if shape[:1] == (None,) else shape
     if array.shape != expected or array.ndim != len(shape):
         raise ValueError(f"{name}: shape {array.shape} given, {_text(shape)} expected")
-    if field.rule != "index":
+    if field.rule in _LOW_ENOUGH:
         _check_values(name, array, field.rule)
     return array if ready else _frozen_copy(array)
 
@@ -173,7 +185,7 @@ def _converted(name: str, value: ArrayLike, field: Field) -> NDArray[Any]:
         raise ValueError(f"{name}: cannot be read as an array: {error}") from None
     if array.size == 0:
         return array.astype(field.dtype)
-    if field.rule == "index":
+    if field.dtype == _INT32:
         if array.dtype.kind not in "iu":
             raise ValueError(f"{name}: {array.dtype} given, indices (whole numbers) expected")
         if array.dtype != _INT32 and (array.min() < -(2**31) or array.max() >= 2**31):
@@ -219,6 +231,27 @@ def _check_indices(name: str, array: IntArray, n_masses: int) -> None:
     raise ValueError(
         f"{name}[{row}] = {tuple(array[row].tolist())}: must name {what} different masses, "
         f"each from 0 to {n_masses - 1}"
+    )
+
+
+def _checked_table(value: Any) -> tuple[Any, ...]:
+    from warp_springs.materials import Material
+
+    table = () if value is None else tuple(value)
+    for index, material in enumerate(table):
+        if not isinstance(material, Material):
+            raise ValueError(f"materials[{index}]: got {material!r}, expected a Material")
+    return table
+
+
+def check_labels(labels: IntArray, n_materials: int) -> None:
+    """Refuse labels, of any shape, that are neither -1 nor a row of the table of materials."""
+    if labels.size == 0 or (labels.min() >= -1 and labels.max() < n_materials):
+        return
+    at = tuple(int(i) for i in np.argwhere((labels < -1) | (labels >= n_materials))[0])
+    raise ValueError(
+        f"material{list(at)} = {labels[at]}: must be -1 (none) or a row of the {n_materials} "
+        "materials"
     )
 
 

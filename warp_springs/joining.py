@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_springs.geometry import FloatArray, IntArray
+from warp_springs.materials import Material
 from warp_springs.robot import Robot
 
 __all__ = ["join"]
@@ -80,10 +81,12 @@ def _concatenated(
     if unique:
         keep = _first_of_each_pair(springs, len(masses))
         faces = _exterior(*faces)
+    materials = tuple(dict.fromkeys((*first.materials, *second.materials)))
     per_spring = {
         name: np.concatenate([getattr(first, name), getattr(second, name)])[keep]
         for name in ("stiffness", "rest_length", "amplitude", "phase")
     }
+    labels = [_relabelled(robot, materials) for robot in (first, second)]
     return Robot(
         masses=masses,
         positions=np.concatenate([first.positions, second.positions[fresh]]),
@@ -91,8 +94,16 @@ def _concatenated(
         springs=springs[keep],
         omega=omega,
         faces=np.concatenate(faces),
+        material=np.concatenate(labels)[keep],
+        materials=materials,
         **per_spring,
     )
+
+
+def _relabelled(robot: Robot, materials: tuple[Material, ...]) -> IntArray:
+    """The labels of a robot's springs in another table that holds all its materials."""
+    number = np.array([*(materials.index(m) for m in robot.materials), -1], np.int32)
+    return number[robot.material]  # -1, none, is the last one
 
 
 def _first_of_each_pair(springs: IntArray, n_masses: int) -> NDArray[np.intp]:

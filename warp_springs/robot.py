@@ -20,6 +20,9 @@ from warp_springs.geometry import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from warp_springs.materials import Material, Region
     from warp_springs.variants import Variants
 
 __all__ = ["Robot"]
@@ -45,6 +48,9 @@ class Robot:
         omega: Angular frequency of the actuation [rad/s], one number for the robot.
         faces: Corners of the exterior triangles, counter-clockwise seen from outside, shape
             (T, 3); none when left out.
+        material: Row of ``materials`` that each spring is made of, -1 for none, shape (S,); none
+            when left out. See `made_of`.
+        materials: The materials that springs are made of.
 
     Raises:
         ValueError: An array is malformed: the message names the field, the first bad index, what
@@ -64,6 +70,8 @@ class Robot:
     phase: FloatArray
     omega: float
     faces: IntArray
+    material: IntArray
+    materials: tuple[Material, ...]
 
     def __init__(
         self,
@@ -78,6 +86,8 @@ class Robot:
         phase: ArrayLike | None = None,
         omega: float = 0.0,
         faces: ArrayLike | None = None,
+        material: ArrayLike | None = None,
+        materials: Sequence[Material] = (),
     ) -> None:
         given = {
             "masses": masses,
@@ -90,6 +100,8 @@ class Robot:
             "phase": phase,
             "omega": omega,
             "faces": faces,
+            "material": material,
+            "materials": materials,
         }
         _assign(self, settled(given, FIELDS))
 
@@ -129,6 +141,15 @@ class Robot:
     def diameter(self) -> float:
         """Largest distance between two masses [m]."""
         return largest_distance(self.positions)
+
+    @property
+    def volume(self) -> float:
+        """Volume inside the faces [m^3], by the divergence theorem; 0 without faces.
+
+        Meaningful where the faces are closed and turn outward, as those of the shapes do.
+        """
+        a, b, c = (self.positions - self.positions.mean(axis=0))[self.faces].transpose(1, 0, 2)
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
     @property
     def is_actuated(self) -> bool:
@@ -248,6 +269,42 @@ class Robot:
         arms = self.positions - self.center_of_mass
         return self.replace(velocities=self.velocities + arms @ cross_matrix(w).T)
 
+    def made_of(self, material: Material, where: Region | None = None) -> Robot:
+        """The robot with all springs, or some, made of a material.
+
+        They get its stiffness (for bars E A / L, L the rest length), its breathing (amplitude
+        strain * rest_length, and phase), and its label in ``material``. Masses stay: see
+        `weighed`. A robot without an omega gets the course's 2 pi rad/s with its first muscle.
+
+        Args:
+            material: One of ``ws.materials`` or a ``ws.Material`` of your own.
+            where: Which springs: a mask (S,), indices, the lowest and highest corner of a box
+                around their middles, (2, 3) real numbers [m], or a function of the middles (S, 3)
+                [m] that returns one of these; all when left out.
+
+        Raises:
+            ValueError: The region is malformed, or a bar has no length.
+            TypeError: The material is none.
+        """
+        from warp_springs.materials import apply
+
+        return apply(self, material, where)
+
+    def weighed(self) -> Robot:
+        """The robot with the masses that follow from its materials, all of which need a density.
+
+        Bars (materials with a section) weigh density * section * rest_length, half at each end.
+        Other springs share the volume inside the faces evenly, each filling its part with its
+        density, half of it at each end.
+
+        Raises:
+            ValueError: A spring has no material, a material has no density, only some materials
+                have a section, or none has and the faces enclose no volume.
+        """
+        from warp_springs.materials import weigh
+
+        return weigh(self)
+
     def joined(self, other: Robot, merge: bool = False, tolerance: float = 1e-9) -> Robot:
         """This robot and another as one body: this one's masses and springs come first.
 
@@ -294,11 +351,14 @@ class Robot:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Robot):
             return NotImplemented
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in FIELDS)
+        return self.materials == other.materials and all(
+            np.array_equal(getattr(self, name), getattr(other, name)) for name in _ARRAYS
+        )
 
     def __hash__(self) -> int:
         # Adding 0 turns -0.0 into 0.0: the two are equal, so they must hash alike.
-        return hash(tuple((getattr(self, name) + np.zeros(1)).tobytes() for name in FIELDS))
+        arrays = ((getattr(self, name) + np.zeros(1)).tobytes() for name in _ARRAYS)
+        return hash((self.materials, *arrays))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, ({name: getattr(self, name) for name in FIELDS},)
@@ -309,6 +369,9 @@ class Robot:
             f"Robot({self.n_masses} masses, {self.n_springs} springs, {len(self.faces)} faces, "
             f"{self.mass:.4g} kg{actuated})"
         )
+
+
+_ARRAYS = tuple(name for name, field in FIELDS.items() if field.rule != "table")
 
 
 class _Connections:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from typing import Literal
 
 from warp_springs.checks import check_choice, check_number
+from warp_springs.materials import FRICTION
 
 __all__ = ["Ground", "Scene", "damping_rate"]
 
@@ -39,15 +40,31 @@ class Ground:
             mu_s F_n the horizontal force is zeroed and the mass stops, above it the force is
             reduced by mu_k F_n).
 
-    Both coefficients zero: no friction is computed. The default pair is rubber on concrete.
+    Both coefficients zero: no friction is computed. Where they are left out they are those of
+    ``material``, two surfaces of ``ws.materials.FRICTION``: rubber on concrete by default.
+
+    Raises:
+        ValueError: A number is out of range, or both ``material`` and a coefficient are given.
+        KeyError: The table does not hold the two surfaces.
     """
 
     stiffness: float = 1e5
-    static_friction: float = 1.0
-    kinetic_friction: float = 0.8
+    static_friction: float = None  # type: ignore[assignment]  # a number once it is made
+    kinetic_friction: float = None  # type: ignore[assignment]
     friction: Literal["coulomb", "course"] = "coulomb"
+    material: InitVar[tuple[str, str] | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, material: tuple[str, str] | None) -> None:
+        pair = FRICTION[material or ("rubber", "concrete")]
+        for name, value in pair._asdict().items():
+            given = getattr(self, f"{name}_friction")
+            if given is None:
+                object.__setattr__(self, f"{name}_friction", value)
+            elif material is not None:
+                raise ValueError(
+                    f"Ground.{name}_friction: got {given!r} and material={material!r}; the "
+                    "material decides both coefficients, so give one or the other"
+                )
         check_number("Ground.stiffness", self.stiffness, above=0.0)
         check_number("Ground.static_friction", self.static_friction, at_least=0.0)
         check_number("Ground.kinetic_friction", self.kinetic_friction, at_least=0.0)

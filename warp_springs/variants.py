@@ -10,11 +10,11 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warp_springs.fields import FIELDS, checked, freeze
+from warp_springs.fields import FIELDS, check_labels, checked, freeze
 from warp_springs.robot import Robot
 
-STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule != "index")
-"""The fields in which variants of one body may differ: all but its springs and faces."""
+STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule not in ("index", "table"))
+"""The fields in which variants of one body may differ: all but springs, faces and materials."""
 
 
 class Variants(Sequence[Robot]):
@@ -28,7 +28,7 @@ class Variants(Sequence[Robot]):
             positions do not change them.
         stacked: Field name -> array with one row a robot on axis 0 and then the shape of the
             field: (N, M) masses, (N, M, 3) positions or velocities, (N, S) stiffness,
-            rest_length, amplitude or phase, (N,) omega. At least one.
+            rest_length, amplitude, phase or material, (N,) omega. At least one.
 
     Raises:
         TypeError: A field cannot be stacked.
@@ -41,7 +41,7 @@ class Variants(Sequence[Robot]):
     def __init__(self, body: Robot, stacked: Mapping[str, ArrayLike]) -> None:
         if not stacked:
             raise ValueError(f"variants need at least one stacked field of {', '.join(STACKABLE)}")
-        arrays: dict[str, NDArray[np.float64]] = {}
+        arrays: dict[str, NDArray[Any]] = {}
         count = None
         for name, value in stacked.items():
             if name not in STACKABLE:
@@ -49,9 +49,11 @@ class Variants(Sequence[Robot]):
             shape = (count, *np.shape(getattr(body, name)))
             arrays[name] = checked(name, value, shape, spread=False)
             count = len(arrays[name])
+        if "material" in arrays:
+            check_labels(arrays["material"], len(body.materials))
         self._keep(body, arrays, count or 0)
 
-    def _keep(self, body: Robot, arrays: dict[str, NDArray[np.float64]], count: int) -> None:
+    def _keep(self, body: Robot, arrays: dict[str, NDArray[Any]], count: int) -> None:
         for name, value in zip(self.__slots__, (body, count, arrays), strict=True):
             object.__setattr__(self, name, value)
 
@@ -61,7 +63,7 @@ class Variants(Sequence[Robot]):
         return self._body
 
     @property
-    def stacked(self) -> Mapping[str, NDArray[np.float64]]:
+    def stacked(self) -> Mapping[str, NDArray[Any]]:
         """The stacked fields: name -> read-only array (N, ...)."""
         return MappingProxyType(self._stacked)
 
@@ -71,12 +73,14 @@ class Variants(Sequence[Robot]):
         The stacked array, or a view of the body's own that repeats it without copying.
 
         Raises:
-            ValueError: A robot has no such field.
+            ValueError: A robot has no such array.
         """
         if name in self._stacked:
             return self._stacked[name]
         if name not in FIELDS:
             raise ValueError(f"a robot has no field {name!r}; it has {', '.join(FIELDS)}")
+        if FIELDS[name].rule == "table":
+            raise ValueError(f"{name} are no array: all variants have those of the body")
         value = getattr(self._body, name)
         return np.broadcast_to(value, (self._count, *np.shape(value)))
 
