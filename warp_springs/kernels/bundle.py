@@ -10,7 +10,7 @@ from warp_springs.kernels.buffers import BUNDLE
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.law import CONSTANTS, LAW
 
-__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "Features", "preamble"]
+__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "preamble"]
 
 #: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
 #: of the simulation.
@@ -88,30 +88,10 @@ real* const left_over = (real*)(shifted_x + M);
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
-// Accounts of the ledger since it was opened: work of the breathing springs, and losses to
-// damping, drag and friction [J].
+// Accounts of the ledger since it was opened.
 real* const ledger = (real*)(state.ledgers.data + 8 * lane_);
 real* const good_ledger = ledger + 4;
 real power = zero;
-auto enter = [&](const Losses& losses, Vec before, Vec after, real w)
-        __attribute__((always_inline)) {
-    if (!LEDGER) return;
-    if (DAMPING) ledger[1] += loss_work(losses.damping, before, after, w);
-    if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
-    if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
-};
-// A mass that slides is kicked, then rubbed; one that sticks is both at once, and friction takes
-// back what the kick gave.
-auto enter_step = [&](const Losses& losses, const Losses& rubbed, Vec before, Vec kicked, Vec after,
-                      real w) __attribute__((always_inline)) {
-    if (!LEDGER) return;
-    const mask slides = (after.x != zero) | (after.y != zero);
-    auto choose = [=](Vec a, Vec b) -> Vec {
-        return Vec{select(slides, a.x, b.x), select(slides, a.y, b.y), a.z};
-    };
-    enter(losses, before, choose(kicked, after), w);
-    enter(rubbed, choose(kicked, before), after, w);
-};
 
 auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
@@ -140,18 +120,12 @@ auto row_force = [&](const Vec* x, int i, real si, real co)
 // The reasons, by lane, why a robot must be stopped now, as values of warp_springs.Status: 1 not
 // finite, 2 overstretched, 3 too fast, 4 too deep; 0 none.
 auto diagnose = [=]() -> mask {
-    const real limit2 = zero + speed_limit * speed_limit;
     real poison = zero;
     mask fast = zero > zero, stretched = fast, deep = fast;
-    // Whoever was shot away and braked since the last check shows by the way it went.
-    const scalar way = speed_limit * dt * scalar(CHECK_EVERY);
-    const real way2 = zero + way * way;
     for (int i = 0; i < M; ++i) {
         const Vec a = x[i], u = v[i];
-        poison += (a.x + a.y + a.z + u.x + u.y + u.z) * scalar(0);
-        const Vec d = a - good_x[i];
-        fast |= u.x * u.x + u.y * u.y + u.z * u.z > limit2;
-        fast |= d.x * d.x + d.y * d.y + d.z * d.z > way2;
+        poison += poison_of(a, u);
+        fast |= too_fast(u, a - good_x[i]);
         if (GROUND) deep |= a.z < -depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
@@ -169,6 +143,7 @@ auto stopped_lanes = [=]() -> mask {
     for (int l = 0; l < W; ++l) stopped[l] = health[l] != 0 ? -1 : 0;
     return stopped;
 };
+auto all_stopped = [=]() -> bool { return !any(~stopped_lanes()); };
 """
 
 CONTROL = r"""
@@ -207,6 +182,42 @@ auto turn_oscillators = [&]() __attribute__((always_inline)) {
 };
 """
 
+# The steps, in terms of a layout's passes.
+STEPS = r"""
+const long long past = (long long)last_step * division_;
+prepare();
+begin();
+bool gone = all_stopped();  // nobody is left to step
+for (long long n = (long long)first_step * division_; n < past; ++n) {
+    if (n % CHECK_EVERY == 0) {
+        end();
+        check(n);
+        begin();
+        gone = all_stopped();
+        if (ACTUATED) set_oscillators(n);
+    }
+    if (gone) {
+        turn_oscillators();
+        if (CHIN4) turn_oscillators();
+        continue;
+    }
+    const bool start = n == 0;
+    const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
+    if (EULER) euler();
+    else kick_and_drift(false, time, start, !CHIN4);
+    if (LEDGER) enter_work(time);
+    turn_oscillators();
+    if (CHIN4) {
+        gradient_shift();
+        if (LEDGER) enter_work(GRADIENT_KICK);
+        kick_and_drift(true, GRADIENT_KICK, false, true);
+        power = zero;
+        turn_oscillators();
+    }
+}
+end();
+"""
+
 OBSERVE = r"""
 Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
 Vec* const seen_v = (Vec*)(seen.seen_velocities.data + state_);
@@ -236,15 +247,15 @@ for (int i = 0; i < M; ++i) {
     Vec u = v[i];
     Losses losses = {};
     if (!EULER && step > 0) synchronise(u, f, w[i], x[i].z, losses);
-    enter(losses, v[i], u, w[i]);
+    enter(ledger, losses, v[i], u, w[i]);
     const Vec a = seen_x[i] = choose(good_x[i], x[i]);
     u = seen_v[i] = choose(good_v[i], u);
     const real m = (zero + scalar(1)) / w[i];
     total_mass += m;
     cx += m * a.x; cy += m * a.y; cz += m * a.z;
-    kinetic += m * (u.x * u.x + u.y * u.y + u.z * u.z) * scalar(0.5);
-    gravity -= m * (a.x * gravity_x + a.y * gravity_y + a.z * gravity_z);
-    if (GROUND) ground += ground_force(a.z) * a.z * scalar(-0.5);
+    kinetic += kinetic_energy(u, m);
+    gravity += gravity_energy(a, m);
+    if (GROUND) ground += ground_energy(a.z);
 }
 com[0] = cx / total_mass; com[1] = cy / total_mass; com[2] = cz / total_mass;
 if (LEDGER) {

@@ -8,7 +8,7 @@ import functools
 
 import warp as wp
 
-__all__ = ["native_width", "vector_dialect"]
+__all__ = ["native_width", "quad_operations", "vector_dialect"]
 
 
 @wp.func_native("""
@@ -93,4 +93,39 @@ def vector_dialect(precision: str, width: int) -> str:
         return scalar(1) / __builtin_elementwise_sqrt(a);
     #endif
     }};
+    """
+
+
+def quad_operations(width: int) -> str:
+    """C++ text: ``transpose`` and ``spread0`` ... ``spread3``, for four or more lanes.
+
+    ``transpose`` takes four vectors of W / 4 rows (x, y, z, w) each to x, y, z, w of W rows, and
+    back; row r of vector v goes to lane 4 r + v. ``spread1(g)`` repeats the y of every row.
+    """
+
+    def shuffle(*pattern: int) -> str:
+        # Within each group of four lanes; from 4 on the second vector.
+        return ", ".join(
+            str(q + lane % 4 + (width if lane >= 4 else 0))
+            for q in range(0, width, 4)
+            for lane in pattern
+        )
+
+    spread = "".join(
+        f"auto spread{i} = [](real g) __attribute__((always_inline)) -> real "
+        f"{{ return __builtin_shufflevector(g, g, {shuffle(i, i, i, i)}); }};\n"
+        for i in range(4)
+    )
+    return f"""
+    auto transpose = [](real& a, real& b, real& c, real& d) __attribute__((always_inline)) {{
+        const real ab = __builtin_shufflevector(a, b, {shuffle(0, 4, 1, 5)});
+        const real ba = __builtin_shufflevector(a, b, {shuffle(2, 6, 3, 7)});
+        const real cd = __builtin_shufflevector(c, d, {shuffle(0, 4, 1, 5)});
+        const real dc = __builtin_shufflevector(c, d, {shuffle(2, 6, 3, 7)});
+        a = __builtin_shufflevector(ab, cd, {shuffle(0, 1, 4, 5)});
+        b = __builtin_shufflevector(ab, cd, {shuffle(2, 3, 6, 7)});
+        c = __builtin_shufflevector(ba, dc, {shuffle(0, 1, 4, 5)});
+        d = __builtin_shufflevector(ba, dc, {shuffle(2, 3, 6, 7)});
+    }};
+    {spread}
     """

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import warp as wp
 
 from warp_springs.kernels.buffers import structs
-from warp_springs.kernels.bundle import CONTROL, OBSERVE, Features, preamble
+from warp_springs.kernels.bundle import CONTROL, OBSERVE, STEPS, Features, preamble
 from warp_springs.kernels.strands import strand_passes, strand_scratch
 
 __all__ = ["Features", "Kernels", "kernels", "scratch_size"]
@@ -63,26 +63,16 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
     for (int i = 0; i < M; ++i) {
         const Vec f = row_force(where, i, si, co);
         Vec a = x[i], u = v[i];
-        const Vec before = u;
-        Losses losses = {};
-        if (!start) lose_before(u, w[i], losses);
-        kick(u, f, w[i], a.z, time, losses);
-        lose_after(u, w[i], losses);
-        const Vec kicked = u;
-        Losses rubbed = {};
         real rest = CHIN4 && last ? left_over[i] : zero;
-        drift(a, u, w[i], substeps, rest, last, rubbed);
+        move_mass(a, u, f, w[i], substeps, rest, time, start, last, ledger);
         if (CHIN4 && !last) left_over[i] = rest;
-        enter_step(losses, rubbed, before, kicked, Vec{u.x, u.y, kicked.z}, w[i]);
         x[i] = a; v[i] = u;
     }
 };
 auto gradient_shift = [&]() __attribute__((always_inline)) {
     const real si = sine, co = cosine;
     for (int i = 0; i < M; ++i) {
-        const Vec a = kick_acceleration(row_force(x, i, si, co), w[i]), b = x[i];
-        shifted_x[i] = Vec{b.x + a.x * GRADIENT_SHIFT, b.y + a.y * GRADIENT_SHIFT,
-                           b.z + a.z * GRADIENT_SHIFT};
+        shifted_x[i] = shifted_position(x[i], row_force(x, i, si, co), w[i]);
     }
 };
 auto euler = [&]() __attribute__((always_inline)) {
@@ -90,10 +80,7 @@ auto euler = [&]() __attribute__((always_inline)) {
     for (int i = 0; i < M; ++i) {
         const Vec f = row_force(x, i, si, co);
         Vec a = x[i], u = v[i];
-        const Vec before = u;
-        Losses losses = {};
-        euler_step(a, u, f, w[i], losses);
-        enter(losses, before, u, w[i]);
+        move_mass_euler(a, u, f, w[i], ledger);
         x[i] = a; v[i] = u;
     }
 };
@@ -101,42 +88,6 @@ auto euler = [&]() __attribute__((always_inline)) {
 auto prepare = [&]() { for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero}; };
 auto begin = []() {};
 auto end = []() {};
-"""
-
-# The steps, in terms of either layout's passes.
-_STEPS = r"""
-const long long past = (long long)last_step * division_;
-prepare();
-begin();
-bool gone = !any(~stopped_lanes());  // nobody is left to step
-for (long long n = (long long)first_step * division_; n < past; ++n) {
-    if (n % CHECK_EVERY == 0) {
-        end();
-        check(n);
-        begin();
-        gone = !any(~stopped_lanes());
-        if (ACTUATED) set_oscillators(n);
-    }
-    if (gone) {
-        turn_oscillators();
-        if (CHIN4) turn_oscillators();
-        continue;
-    }
-    const bool start = n == 0;
-    const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
-    if (EULER) euler();
-    else kick_and_drift(false, time, start, !CHIN4);
-    if (LEDGER) enter_work(time);
-    turn_oscillators();
-    if (CHIN4) {
-        gradient_shift();
-        if (LEDGER) enter_work(GRADIENT_KICK);
-        kick_and_drift(true, GRADIENT_KICK, false, true);
-        power = zero;
-        turn_oscillators();
-    }
-}
-end();
 """
 
 _NO_LEDGER = "auto enter_work = [](scalar) {};"
@@ -156,7 +107,7 @@ def kernels(features: Features) -> Kernels:
     strand = features.width == 1 and not features.ledger
     passes = strand_passes(features.precision) + _NO_LEDGER if strand else _PASSES
 
-    @wp.func_native(common + CONTROL + passes + _STEPS)
+    @wp.func_native(common + CONTROL + passes + STEPS)
     def advance_bundle(
         model: Model,
         state: State,

@@ -12,8 +12,9 @@ A layout puts in front of ``LAW`` a dialect that defines
 ``inverse_root(a)``       1 / sqrt(a) to the last bit or two, for a >= TINY
 ========================  ======================================================================
 
-and the constants of ``CONSTANTS`` as ``const scalar``, and the compile-time ``const bool`` of the
-features. What a scene lacks is a ``false`` there, and the compiler drops its code.
+and the constants of ``CONSTANTS`` as ``const scalar``, the compile-time ``const bool`` of the
+features, and CHECK_EVERY, the steps from one look at the health to the next. What a scene lacks is
+a ``false`` there, and the compiler drops its code.
 
 Units are SI; ``w`` is the inverse of a mass [1/kg].
 """
@@ -295,5 +296,75 @@ auto euler_step = [=](Vec& x, Vec& v, Vec f, real w, Losses& losses)
     damp(v, losses);
     slow_down(v, w, dt, losses);
     x.x += v.x * dt; x.y += v.y * dt; x.z += v.z * dt;
+};
+
+// The accounts of the ledger [J]: work of the breathing springs, and what damping, drag and
+// friction took from a mass of inverse w.
+auto enter = [=](real* ledger, const Losses& losses, Vec before, Vec after, real w)
+        __attribute__((always_inline)) {
+    if (!LEDGER) return;
+    if (DAMPING) ledger[1] += loss_work(losses.damping, before, after, w);
+    if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
+    if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
+};
+// A mass that slides is kicked, then rubbed; one that sticks is both at once, and friction takes
+// back what the kick gave.
+auto enter_step = [=](real* ledger, const Losses& losses, const Losses& rubbed, Vec before,
+                      Vec kicked, Vec after, real w) __attribute__((always_inline)) {
+    if (!LEDGER) return;
+    const mask slides = (after.x != zero) | (after.y != zero);
+    auto choose = [=](Vec a, Vec b) -> Vec {
+        return Vec{select(slides, a.x, b.x), select(slides, a.y, b.y), a.z};
+    };
+    enter(ledger, losses, before, choose(kicked, after), w);
+    enter(ledger, rubbed, choose(kicked, before), after, w);
+};
+
+// One mass moved by its whole force f: a kick of `time` seconds and the drift after it. `start`:
+// nothing came before; `last`: the last drift of the step; `left_over`: see touch_down.
+auto move_mass = [=](Vec& x, Vec& v, Vec f, real w, int substeps, real& left_over, scalar time,
+                     bool start, bool last, real* ledger) __attribute__((always_inline)) {
+    const Vec before = v;
+    Losses losses = {}, rubbed = {};
+    if (!start) lose_before(v, w, losses);
+    kick(v, f, w, x.z, time, losses);
+    lose_after(v, w, losses);
+    const Vec kicked = v;
+    drift(x, v, w, substeps, left_over, last, rubbed);
+    enter_step(ledger, losses, rubbed, before, kicked, Vec{v.x, v.y, kicked.z}, w);
+};
+auto move_mass_euler = [=](Vec& x, Vec& v, Vec f, real w, real* ledger)
+        __attribute__((always_inline)) {
+    const Vec before = v;
+    Losses losses = {};
+    euler_step(x, v, f, w, losses);
+    enter(ledger, losses, before, v, w);
+};
+// Where the gradient kick of chin4 looks.
+auto shifted_position = [=](Vec x, Vec f, real w) __attribute__((always_inline)) -> Vec {
+    const Vec a = kick_acceleration(f, w);
+    return Vec{x.x + a.x * GRADIENT_SHIFT, x.y + a.y * GRADIENT_SHIFT, x.z + a.z * GRADIENT_SHIFT};
+};
+
+// Health of a mass. Who was shot away and braked since the last check shows by the way it went.
+auto too_fast = [=](Vec v, Vec way) __attribute__((always_inline)) -> mask {
+    const scalar reach = speed_limit * dt * scalar(CHECK_EVERY);
+    return (v.x * v.x + v.y * v.y + v.z * v.z > zero + speed_limit * speed_limit)
+        | (way.x * way.x + way.y * way.y + way.z * way.z > zero + reach * reach);
+};
+// Zero where all numbers are finite, else not a number.
+auto poison_of = [=](Vec x, Vec v) __attribute__((always_inline)) -> real {
+    return (x.x + x.y + x.z + v.x + v.y + v.z) * scalar(0);
+};
+
+// Energies of a mass m [J].
+auto kinetic_energy = [=](Vec v, real m) __attribute__((always_inline)) -> real {
+    return m * (v.x * v.x + v.y * v.y + v.z * v.z) * scalar(0.5);
+};
+auto gravity_energy = [=](Vec x, real m) __attribute__((always_inline)) -> real {
+    return -(m * (x.x * gravity_x + x.y * gravity_y + x.z * gravity_z));
+};
+auto ground_energy = [=](real z) __attribute__((always_inline)) -> real {
+    return ground_force(z) * z * scalar(-0.5);
 };
 """

@@ -10,7 +10,7 @@ The order of every sum is that of ``kernels.lanes`` and the law is the same text
 are the same in both.
 """
 
-from warp_springs.kernels.dialect import native_width, vector_dialect
+from warp_springs.kernels.dialect import native_width, quad_operations, vector_dialect
 from warp_springs.kernels.law import LAW
 
 __all__ = ["strand_passes", "strand_scratch", "strand_width"]
@@ -34,35 +34,11 @@ def strand_passes(precision: str) -> str:
     """C++ text: the passes of ``kernels.lanes`` for one robot."""
     width = strand_width(precision)
 
-    def shuffle(*pattern: int) -> str:
-        # Within each group of four lanes; from 4 on the second vector.
-        return ", ".join(
-            str(q + lane % 4 + (width if lane >= 4 else 0))
-            for q in range(0, width, 4)
-            for lane in pattern
-        )
-
-    spread = "".join(
-        f"auto spread{i} = [](real g) __attribute__((always_inline)) -> real "
-        f"{{ return __builtin_shufflevector(g, g, {shuffle(i, i, i, i)}); }};\n"
-        for i in range(4)
-    )
     return f"""
 auto pass = [&](int job, scalar time, bool start, bool last) {{
     {vector_dialect(precision, width)}
     {LAW}
-    // Four vectors of W / 4 rows (x, y, z, w) each, to x, y, z, w of W rows, and back.
-    auto transpose = [](real& a, real& b, real& c, real& d) __attribute__((always_inline)) {{
-        const real ab = __builtin_shufflevector(a, b, {shuffle(0, 4, 1, 5)});
-        const real ba = __builtin_shufflevector(a, b, {shuffle(2, 6, 3, 7)});
-        const real cd = __builtin_shufflevector(c, d, {shuffle(0, 4, 1, 5)});
-        const real dc = __builtin_shufflevector(c, d, {shuffle(2, 6, 3, 7)});
-        a = __builtin_shufflevector(ab, cd, {shuffle(0, 1, 4, 5)});
-        b = __builtin_shufflevector(ab, cd, {shuffle(2, 3, 6, 7)});
-        c = __builtin_shufflevector(ba, dc, {shuffle(0, 1, 4, 5)});
-        d = __builtin_shufflevector(ba, dc, {shuffle(2, 3, 6, 7)});
-    }};
-    {spread}
+    {quad_operations(width)}
     {_PASS}
 }};
 {_JOBS}
@@ -189,22 +165,17 @@ for (int i = 0; i < MP; i += W) {
     transpose(a.x, a.y, a.z, iw);
     transpose(f.x, f.y, f.z, fpad);
     if (job == 4) {
-        const Vec b = kick_acceleration(f, iw);
-        a.x += b.x * GRADIENT_SHIFT; a.y += b.y * GRADIENT_SHIFT; a.z += b.z * GRADIENT_SHIFT;
+        a = shifted_position(a, f, iw);
         transpose(a.x, a.y, a.z, iw);
         real* const ys = (real*)(shifted_x + i);
         ys[0] = a.x; ys[1] = a.y; ys[2] = a.z; ys[3] = iw;
         continue;
     }
     transpose(u.x, u.y, u.z, vpad);
-    Losses losses = {};
-    if (EULER) euler_step(a, u, f, iw, losses);
+    if (EULER) move_mass_euler(a, u, f, iw, 0);
     else {
-        if (!start) lose_before(u, iw, losses);
-        kick(u, f, iw, a.z, time, losses);
-        lose_after(u, iw, losses);
         real rest = CHIN4 && last ? left[i / W] : zero;
-        drift(a, u, iw, substeps, rest, last, losses);
+        move_mass(a, u, f, iw, substeps, rest, time, start, last, 0);
         if (CHIN4 && !last) left[i / W] = rest;
     }
     vpad = zero;
