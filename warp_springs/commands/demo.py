@@ -85,13 +85,10 @@ def _print_outcome(console: Console, result: Result) -> None:
 
 
 def _energy_figure(result: Result, path: Path) -> None:
-    from matplotlib.figure import Figure
-
     from warp_springs.view import plots
 
-    figure = Figure(figsize=(9, 6), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True)
+    figure = plots.figure(9.0, 7.0)
+    above, below = figure.subplots(2, 1, height_ratios=(3, 2))
     plots.energies(above, result)
     plots.height(below, result)
-    above.set_xlabel("")
-    figure.savefig(path, dpi=120)
+    figure.savefig(path)

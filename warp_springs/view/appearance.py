@@ -37,6 +37,13 @@ _BALL_PER_BAR = 1.9
 _LENGTH_WITHOUT_SPRINGS = 0.1
 
 
+def to_screen(linear: ArrayLike) -> NDArray[np.float64]:
+    """Return the sRGB values, 0 ... 1, of linear ones of any shape (IEC 61966-2-1)."""
+    linear = np.asarray(linear, dtype=np.float64)
+    curved = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, curved)
+
+
 def stress_palette() -> NDArray[np.float32]:
     """Return the table that `stress_index` points into, (1 + 2 * STRESS_STEPS, 3) linear RGB.
 

@@ -284,10 +284,8 @@ def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:
 
 
 def _screen_values(n: int = 4096) -> NDArray[np.uint8]:
-    """Return the sRGB values of n linear ones from 0 to 1 (IEC 61966-2-1)."""
-    linear = np.linspace(0.0, 1.0, n)
-    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.rint(255 * curved).astype(np.uint8)
+    """Return the bytes of a screen for n linear values from 0 to 1."""
+    return np.rint(255 * appearance.to_screen(np.linspace(0.0, 1.0, n))).astype(np.uint8)
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
