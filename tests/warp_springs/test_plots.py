@@ -198,7 +198,7 @@ def test_a_picture_comes_out(ax, result, name):
 
     drawn = picture_of(getattr(ws.plots, name)(ax, result))
     assert min(drawn.shape[:2]) > 100
-    assert ink(drawn) > 1.3 * ink(picture_of(Figure(figsize=(5, 3)).add_subplot()))
+    assert ink(drawn) > 1.05 * ink(picture_of(Figure(figsize=(5, 3)).add_subplot()))
 
 
 def test_what_is_missing_is_said(ax, result, cube):
