@@ -11,29 +11,46 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 from warp_springs import materials, shapes
+from warp_springs.elements import Elements, Push, Tether, Timetable
 from warp_springs.energy import Energy
 from warp_springs.materials import Material
 from warp_springs.result import Result
 from warp_springs.robot import Robot
-from warp_springs.scene import Ground, Scene, damping_rate
+from warp_springs.scene import Collisions, Ground, Scene, Water, damping_rate
 from warp_springs.simulation import Simulation
 from warp_springs.stability import Limits, Status, stable_dt
 from warp_springs.startup import quiet
+from warp_springs.surfaces import Box, Circle, HeightField, Line, Plane, Sphere, height_map
 from warp_springs.variants import Variants
+from warp_springs.waveform import Waveform
 
 __all__ = [
+    "Box",
+    "Circle",
+    "Collisions",
+    "Elements",
     "Energy",
     "Ground",
+    "HeightField",
     "Limits",
+    "Line",
     "Material",
+    "Plane",
+    "Push",
     "Result",
     "Robot",
     "Scene",
     "Simulation",
+    "Sphere",
     "Status",
+    "Tether",
+    "Timetable",
     "Variants",
+    "Water",
+    "Waveform",
     "damping_rate",
     "export_usd",
+    "height_map",
     "materials",
     "plots",
     "quiet",

@@ -31,6 +31,7 @@ from warp_springs.packing import (
 )
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
+from warp_springs.support import refuse_unsupported
 from warp_springs.variants import Variants
 
 __all__ = ["Batch", "Group", "Slots"]
@@ -125,6 +126,7 @@ class Batch:
     """
 
     def __init__(self, robots: Sequence[Robot], scene: Scene, method: Method) -> None:
+        refuse_unsupported(robots, scene)
         self._scene, self._method = scene, method
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_springs.elements import join_elements
 from warp_springs.geometry import FloatArray, IntArray
 from warp_springs.materials import Material
 from warp_springs.robot import Robot
@@ -96,6 +97,15 @@ def _concatenated(
         faces=np.concatenate(faces),
         material=np.concatenate(labels)[keep],
         materials=materials,
+        elements=join_elements(
+            first.elements,
+            second.elements,
+            (first.n_springs, second.n_springs),
+            index,
+            keep=keep,
+            masses=first.n_masses,
+            fresh=fresh,
+        ),
         **per_spring,
     )
 

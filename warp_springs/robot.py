@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warp_springs.elements import NONE, Elements
 from warp_springs.fields import FIELDS, require_positive, require_vector, settled
 from warp_springs.geometry import (
     FloatArray,
@@ -18,6 +19,8 @@ from warp_springs.geometry import (
     rotation_matrix,
     spring_lengths,
 )
+from warp_springs.tensions import rest_length_at, tension
+from warp_springs.verbs import Verbs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Robot"]
 
 
-class Robot:
+class Robot(Verbs):
     """A body of point masses and springs, with a sinusoidal rest length for every spring.
 
     Immutable: every array is read-only and C-contiguous, every method returns a new robot that
@@ -51,6 +54,8 @@ class Robot:
         material: Row of ``materials`` that each spring is made of, -1 for none, shape (S,); none
             when left out. See `made_of`.
         materials: The materials that springs are made of.
+        elements: Cables, harmonics, dashpots, pushes, constraints and more, made by the verbs of
+            a robot (`with_cables`, `pushed`, `fixed`, ...); none when left out.
 
     Raises:
         ValueError: An array is malformed: the message names the field, the first bad index, what
@@ -58,7 +63,7 @@ class Robot:
             one pair, an amplitude above the rest length) are allowed.
     """
 
-    __slots__ = (*FIELDS, "_connections")
+    __slots__ = (*FIELDS, "_connections", "elements")
 
     masses: FloatArray
     positions: FloatArray
@@ -72,6 +77,7 @@ class Robot:
     faces: IntArray
     material: IntArray
     materials: tuple[Material, ...]
+    elements: Elements
 
     def __init__(
         self,
@@ -88,6 +94,7 @@ class Robot:
         faces: ArrayLike | None = None,
         material: ArrayLike | None = None,
         materials: Sequence[Material] = (),
+        elements: Elements | None = None,
     ) -> None:
         given = {
             "masses": masses,
@@ -103,7 +110,7 @@ class Robot:
             "material": material,
             "materials": materials,
         }
-        _assign(self, settled(given, FIELDS))
+        _assign(self, settled(given, FIELDS), _checked_elements(elements))
 
     # -- what a robot is ---------------------------------------------------------------------
 
@@ -153,8 +160,9 @@ class Robot:
 
     @property
     def is_actuated(self) -> bool:
-        """Whether any spring has an amplitude other than zero."""
-        return bool(self.amplitude.any())
+        """Whether any spring has an amplitude, or harmonics, other than zero."""
+        harmonics = self.elements.harmonics
+        return bool(self.amplitude.any()) or (harmonics is not None and bool(harmonics.any()))
 
     @property
     def topology(self) -> bytes:
@@ -167,11 +175,11 @@ class Robot:
 
     def rest_length_at(self, t: ArrayLike) -> FloatArray:
         """Rest lengths at a time [m]: shape (S,) for one time [s], (F, S) for times (F,)."""
-        angle = np.asarray(t, np.float64)[..., None] * self.omega + self.phase
-        return self.rest_length + self.amplitude * np.sin(angle)
+        return rest_length_at(self, t)
 
     def tension(self, positions: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Force in each spring [N], positive where stretched: Hooke's law k (L - L0(t)).
+        """Force in each spring [N], positive where stretched: Hooke's law k (L - L0(t)), or what
+        the elements of the robot make of it; without dashpots, and as if nothing had yielded.
 
         Args:
             positions: Positions [m], shape (M, 3) with one time, (F, M, 3) with times (F,).
@@ -190,7 +198,7 @@ class Robot:
                 f"positions: shape {positions.shape} given, {expected} expected for times of "
                 f"shape {t.shape} and {self.n_masses} masses"
             )
-        return self.stiffness * (spring_lengths(positions, self.springs) - self.rest_length_at(t))
+        return tension(self, spring_lengths(positions, self.springs), t)
 
     # -- new robots from this one ------------------------------------------------------------
 
@@ -204,6 +212,7 @@ class Robot:
             TypeError: A robot has no such field.
             ValueError: A new array is malformed or no longer fits the others.
         """
+        elements = _checked_elements(fields.pop("elements", self.elements))
         for name in fields:
             if name not in FIELDS:
                 raise TypeError(f"a robot has no field {name!r}; it has {', '.join(FIELDS)}")
@@ -214,12 +223,17 @@ class Robot:
         )
         robot = object.__new__(Robot)
         values = settled(kept | fields, fields.keys() if same_body else FIELDS)
-        _assign(robot, values, self._connections if same_body else None)
+        _assign(robot, values, elements, self._connections if same_body else None)
         return robot
 
     def moved(self, offset: ArrayLike) -> Robot:
         """The robot shifted by an offset [m], shape (3,)."""
-        return self.replace(positions=self.positions + require_vector("offset", offset))
+        offset = require_vector("offset", offset)
+        return self.replace(positions=self.positions + offset, **self._carried("moved", offset))
+
+    def _carried(self, verb: str, *how: Any) -> dict[str, Elements]:
+        """The elements that move, turn or grow with the body; nothing where it has none."""
+        return {} if self.elements is NONE else {"elements": getattr(self.elements, verb)(*how)}
 
     def rotated(self, axis: ArrayLike, angle: float, about: ArrayLike | None = None) -> Robot:
         """The robot turned about an axis, its velocities with it.
@@ -237,7 +251,7 @@ class Robot:
         changed = {"positions": centre + (self.positions - centre) @ turn.T}
         if self.velocities.any():
             changed["velocities"] = self.velocities @ turn.T
-        return self.replace(**changed)
+        return self.replace(**changed, **self._carried("turned", turn, centre))
 
     def scaled(self, factor: float) -> Robot:
         """The robot with positions, rest lengths and amplitudes multiplied by a factor > 0.
@@ -253,6 +267,7 @@ class Robot:
             positions=self.positions * factor,
             rest_length=self.rest_length * factor,
             amplitude=self.amplitude * factor,
+            **self._carried("scaled", factor),
         )
 
     def moving(self, velocity: ArrayLike) -> Robot:
@@ -351,17 +366,16 @@ class Robot:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Robot):
             return NotImplemented
-        return self.materials == other.materials and all(
-            np.array_equal(getattr(self, name), getattr(other, name)) for name in _ARRAYS
-        )
+        same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in _ARRAYS)
+        return same and self.materials == other.materials and self.elements == other.elements
 
     def __hash__(self) -> int:
         # Adding 0 turns -0.0 into 0.0: the two are equal, so they must hash alike.
         arrays = ((getattr(self, name) + np.zeros(1)).tobytes() for name in _ARRAYS)
-        return hash((self.materials, *arrays))
+        return hash((self.materials, self.elements, *arrays))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuilt, ({name: getattr(self, name) for name in FIELDS},)
+        return _rebuilt, ({name: getattr(self, name) for name in (*FIELDS, "elements")},)
 
     def __repr__(self) -> str:
         actuated = f", actuated at {self.omega:.4g} rad/s" if self.is_actuated else ""
@@ -387,11 +401,24 @@ class _Connections:
         return digest.digest()
 
 
-def _assign(robot: Robot, values: dict[str, Any], same: _Connections | None = None) -> None:
+def _checked_elements(elements: Elements | None) -> Elements:
+    if elements is None:
+        return NONE
+    if not isinstance(elements, Elements):
+        raise TypeError(f"elements: got {type(elements).__name__}, expected Elements")
+    return NONE if elements == NONE else elements
+
+
+def _assign(
+    robot: Robot, values: dict[str, Any], elements: Elements, same: _Connections | None = None
+) -> None:
     for name, value in values.items():
         object.__setattr__(robot, name, value)
     connections = same or _Connections(len(values["masses"]), values["springs"])
+    if elements is not NONE:
+        elements.check(len(values["masses"]), len(values["springs"]))
     object.__setattr__(robot, "_connections", connections)
+    object.__setattr__(robot, "elements", elements)
 
 
 def _rebuilt(fields: dict[str, Any]) -> Robot:

@@ -7,9 +7,13 @@ from dataclasses import InitVar, dataclass
 from typing import Literal
 
 from warp_springs.checks import check_choice, check_number
+from warp_springs.fields import require_vector
 from warp_springs.materials import FRICTION
+from warp_springs.surfaces import Box, HeightField, Plane, Sphere
 
-__all__ = ["Ground", "Scene", "damping_rate"]
+__all__ = ["Collisions", "Ground", "Scene", "Water", "damping_rate"]
+
+OBSTACLES = (Plane, Sphere, Box, HeightField)
 
 
 def damping_rate(per_step: float, dt: float) -> float:
@@ -77,20 +81,84 @@ class Ground:
 
 
 @dataclass(frozen=True)
+class Water:
+    """Water below a level: buoyancy against gravity, and a drag of its own.
+
+    Attributes:
+        level: Height of its surface [m].
+        density: Density of the water as a multiple of that of the robots: below 1 they sink,
+            above 1 they float. A mass m that is wholly immersed is lifted by density m g.
+        drag: c [kg/m] of the quadratic drag -c |v| v on every mass, besides the scene's own.
+        layer: Way [m] over which a mass that dives goes from dry to wholly immersed, half of it
+            below the level.
+    """
+
+    level: float = 0.0
+    density: float = 1.0
+    drag: float = 0.0
+    layer: float = 0.02
+
+    def __post_init__(self) -> None:
+        check_number("Water.level", self.level, at_least=-math.inf)
+        check_number("Water.density", self.density, at_least=0.0)
+        check_number("Water.drag", self.drag, at_least=0.0)
+        check_number("Water.layer", self.layer, above=0.0)
+
+
+@dataclass(frozen=True)
+class Collisions:
+    """Masses against triangles and edges against edges, of one body and of bodies in one world.
+
+    Where two come closer than ``thickness`` a temporary spring pushes them apart; it vanishes
+    when they part. Features that share a mass, or that a spring joins, do not collide.
+
+    Attributes:
+        thickness: Distance [m] that surfaces keep; 0: 4 % of the median length of the springs.
+        stiffness: Of the temporary springs [N/m].
+        static_friction: Coefficient mu_s below which two surfaces do not slide.
+        kinetic_friction: Coefficient mu_k with which they slide.
+        damping: Of the temporary springs, as a part of critical damping.
+        within: Whether a body also collides with itself.
+    """
+
+    thickness: float = 0.0
+    stiffness: float = 1e4
+    static_friction: float = 1.0
+    kinetic_friction: float = 0.8
+    damping: float = 0.1
+    within: bool = True
+
+    def __post_init__(self) -> None:
+        check_number("Collisions.thickness", self.thickness, at_least=0.0)
+        check_number("Collisions.stiffness", self.stiffness, above=0.0)
+        check_number("Collisions.static_friction", self.static_friction, at_least=0.0)
+        check_number("Collisions.kinetic_friction", self.kinetic_friction, at_least=0.0)
+        check_number("Collisions.damping", self.damping, at_least=0.0)
+
+
+@dataclass(frozen=True)
 class Scene:
-    """Gravity, ground, damping and drag, the same for every robot of a batch.
+    """Gravity, ground, obstacles, wind, water, damping and drag, the same for all robots.
 
     Attributes:
         gravity: Acceleration [m/s^2], shape (3,); tilt it for a slope.
         ground: The floor at z = 0, or ``None`` for free space.
         damping: Rate [1/s]; velocities decay as exp(-damping t). See ``damping_rate``.
         drag: c [kg/m] of the quadratic drag -c |v| v on every mass.
+        wind: Velocity [m/s] of the air, shape (3,), or ``None``: the drag is then relative to it.
+        water: A ``Water``, or ``None``.
+        obstacles: ``ws.Plane``, ``ws.Sphere``, ``ws.Box`` and ``ws.HeightField`` objects.
+        collisions: ``Collisions``, or ``None``: bodies then pass through each other.
     """
 
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     ground: Ground | None = Ground()
     damping: float = 0.0
     drag: float = 0.0
+    wind: tuple[float, float, float] | None = None
+    water: Water | None = None
+    obstacles: tuple[Plane | Sphere | Box | HeightField, ...] = ()
+    collisions: Collisions | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -106,3 +174,23 @@ class Scene:
             raise TypeError(f"Scene.ground: got {self.ground!r}, expected a Ground or None")
         check_number("Scene.damping", self.damping, at_least=0.0)
         check_number("Scene.drag", self.drag, at_least=0.0)
+        self._check_surroundings()
+
+    def _check_surroundings(self) -> None:
+        if self.wind is not None:
+            wind = require_vector("Scene.wind", self.wind)
+            object.__setattr__(self, "wind", tuple(wind.tolist()))
+            if self.drag == 0.0:
+                raise ValueError("Scene.wind: a wind without drag has no force; give drag too")
+        for name, kind in (("water", Water), ("collisions", Collisions)):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, kind):
+                raise TypeError(f"Scene.{name}: got {value!r}, expected a {kind.__name__} or None")
+        given = (self.obstacles,) if isinstance(self.obstacles, OBSTACLES) else self.obstacles
+        object.__setattr__(self, "obstacles", tuple(given))
+        for index, obstacle in enumerate(self.obstacles):
+            if not isinstance(obstacle, OBSTACLES):
+                raise TypeError(
+                    f"Scene.obstacles[{index}]: got {type(obstacle).__name__}, expected a Plane, "
+                    "Sphere, Box or HeightField"
+                )

@@ -10,11 +10,14 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warp_springs.elements import PER_MASS, PER_SPRING, check_rows, frozen
 from warp_springs.fields import FIELDS, check_labels, checked, freeze
 from warp_springs.robot import Robot
 
 STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule not in ("index", "table"))
 """The fields in which variants of one body may differ: all but springs, faces and materials."""
+ELEMENTS = (*PER_SPRING, *PER_MASS)
+"""The arrays of its elements in which they may differ too."""
 
 
 class Variants(Sequence[Robot]):
@@ -28,7 +31,8 @@ class Variants(Sequence[Robot]):
             positions do not change them.
         stacked: Field name -> array with one row a robot on axis 0 and then the shape of the
             field: (N, M) masses, (N, M, 3) positions or velocities, (N, S) stiffness,
-            rest_length, amplitude, phase or material, (N,) omega. At least one.
+            rest_length, amplitude, phase or material, (N,) omega; or arrays of `ws.Elements`,
+            such as (N, S, H, 2) harmonics or (N, S) dashpot. At least one.
 
     Raises:
         TypeError: A field cannot be stacked.
@@ -44,10 +48,14 @@ class Variants(Sequence[Robot]):
         arrays: dict[str, NDArray[Any]] = {}
         count = None
         for name, value in stacked.items():
-            if name not in STACKABLE:
-                raise TypeError(f"variants cannot stack {name!r}, only {', '.join(STACKABLE)}")
-            shape = (count, *np.shape(getattr(body, name)))
-            arrays[name] = checked(name, value, shape, spread=False)
+            if name in ELEMENTS:
+                arrays[name] = _checked_element(body, name, value, count)
+            elif name in STACKABLE:
+                shape = (count, *np.shape(getattr(body, name)))
+                arrays[name] = checked(name, value, shape, spread=False)
+            else:
+                known = ", ".join((*STACKABLE, *ELEMENTS))
+                raise TypeError(f"variants cannot stack {name!r}, only {known}")
             count = len(arrays[name])
         if "material" in arrays:
             check_labels(arrays["material"], len(body.materials))
@@ -100,7 +108,11 @@ class Variants(Sequence[Robot]):
         i = operator.index(index)
         if not -self._count <= i < self._count:
             raise IndexError(f"robot {i} asked for, there are {self._count} variants")
-        return self._body.replace(**{name: array[i] for name, array in self._stacked.items()})
+        rows = {name: array[i] for name, array in self._stacked.items()}
+        changed = {name: frozen(rows.pop(name)) for name in list(rows) if name in ELEMENTS}
+        if changed:
+            rows["elements"] = self._body.elements.replace(**changed)
+        return self._body.replace(**rows)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError("Variants are immutable: make new ones with body.variants(...)")
@@ -110,3 +122,14 @@ class Variants(Sequence[Robot]):
 
     def __repr__(self) -> str:
         return f"Variants({self._count} of {self._body!r} in {', '.join(self._stacked)})"
+
+
+def _checked_element(
+    body: Robot, name: str, value: ArrayLike, count: int | None
+) -> NDArray[np.float64]:
+    array = frozen(value)
+    rows = body.n_springs if name in PER_SPRING else body.n_masses
+    check_rows(name, array, rows, leading=2)
+    if count is not None and len(array) != count:
+        raise ValueError(f"{name}: {len(array)} robots given, {count} expected")
+    return array
