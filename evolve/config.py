@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from evolve.encodings import ENCODINGS
 from evolve.fitness import FITNESS
 from evolve.optimizers import OPTIMIZERS
+from evolve.trials import AGGREGATES
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -18,12 +19,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BODIES",
+    "PerturbationConfig",
     "RunConfig",
     "SceneConfig",
     "SecondLookConfig",
     "SimulationConfig",
     "TaskConfig",
+    "TrialsConfig",
 ]
+
+DESCRIPTORS = ("displacement_x", "displacement_y", "height")
+"""Measured of every robot, whatever the task."""
 
 LONGEST_AUTO_STEP = 1e-3
 """With dt = "auto" no robot takes a longer step [s]."""
@@ -177,7 +183,32 @@ class SimulationConfig(Section):
         return value
 
 
-class SecondLookConfig(Section):
+class PerturbationConfig(Section):
+    """How the start of a trial is disturbed."""
+
+    position: float = Field(0.01, ge=0.0)
+    """Standard deviation of the displacement of each mass along x, y and z [shortest springs]."""
+    velocity: float = Field(0.01, ge=0.0)
+    """Standard deviation of the velocity of each mass along x, y and z [m/s]."""
+    rotation: float = Field(0.1, ge=0.0)
+    """Largest turn about the vertical, either way [rad]."""
+    height: float = Field(0.01, ge=0.0)
+    """Largest lift [shortest springs]."""
+
+
+class TrialsConfig(PerturbationConfig):
+    """Several trials of every robot, from perturbed starts and on floors of different friction."""
+
+    count: int = Field(1, ge=1)
+    """How many; one alone is not perturbed."""
+    friction: float = Field(0.0, ge=0.0, lt=1.0)
+    """The friction coefficients of the trials range from 1 - this to 1 + this times those of the
+    scene, evenly."""
+    aggregate: Literal[tuple(AGGREGATES)] = "mean"  # type: ignore[valid-type]
+    """What becomes of their fitness."""
+
+
+class SecondLookConfig(PerturbationConfig):
     """How the best are simulated again before one of them is crowned."""
 
     threshold: float = Field(0.8, ge=0.0)
@@ -189,25 +220,41 @@ class SecondLookConfig(Section):
     """Perturbed starts of each candidate."""
     quantile: float = Field(0.5, ge=0.0, le=1.0)
     """Which of its perturbed trials counts: 0 the worst, 0.5 the median, 1 the best."""
-    position: float = Field(0.01, ge=0.0)
-    """Standard deviation of the displacement of each mass along x, y and z [shortest springs]."""
-    velocity: float = Field(0.01, ge=0.0)
-    """Standard deviation of the velocity of each mass along x, y and z [m/s]."""
-    rotation: float = Field(0.1, ge=0.0)
-    """Largest turn about the vertical, either way [rad]."""
-    height: float = Field(0.01, ge=0.0)
-    """Largest lift [shortest springs]."""
 
 
 class TaskConfig(Section):
     """What the robots have to do, and when they are believed."""
 
-    fitness: Literal[tuple(FITNESS)] = "speed"  # type: ignore[valid-type]
+    fitness: str = "speed"
+    """What robots are selected for, a name of `evolve.FITNESS`: higher is better."""
+    descriptors: tuple[str, ...] = ()
+    """Further measures to record of every robot, beside its way and its height."""
+    direction: tuple[float, float] = (1.0, 0.0)
+    """Where forward is, over the ground; for the fitness `forward`."""
     settle: float = Field(1.0, gt=0.0)
     """How long they move before they are measured [cycles]."""
     measure: float = Field(4.0, gt=0.0)
     """How long they are measured [cycles]."""
+    trials: TrialsConfig = TrialsConfig()
     second_look: SecondLookConfig = SecondLookConfig()
+
+    @field_validator("fitness")
+    @classmethod
+    def _is_a_measure(cls, value: str) -> str:
+        return _known_measure(value)
+
+    @field_validator("descriptors")
+    @classmethod
+    def _are_measures(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(_known_measure(name) for name in value)
+
+    @field_validator("direction")
+    @classmethod
+    def _points_somewhere(cls, value: tuple[float, float]) -> tuple[float, float]:
+        length = float(np.hypot(*value))
+        if not 0.0 < length < float("inf"):
+            raise ValueError("expected two finite numbers that are not both 0")
+        return value
 
     @field_validator("second_look", mode="before")
     @classmethod
@@ -215,6 +262,12 @@ class TaskConfig(Section):
         if isinstance(value, (int, float)):
             raise ValueError("expected a table; the share to keep is task.second_look.threshold")
         return value
+
+
+def _known_measure(name: str) -> str:
+    if name not in FITNESS:
+        raise ValueError(f"expected measures, which are {', '.join(sorted(FITNESS))}")
+    return name
 
 
 def _choice(models: Any, key: str) -> Any:
@@ -260,6 +313,18 @@ class RunConfig(Section):
                 f"{self.encoding.period:g} s: at most a tenth of encoding.period"
             )
         return self
+
+    @model_validator(mode="after")
+    def _optimizer_is_told_what_it_asks_for(self) -> RunConfig:
+        for name in self.optimizer.measures:
+            _known_measure(name)
+        return self
+
+    @property
+    def descriptors(self) -> tuple[str, ...]:
+        """Names of what is recorded of every robot beside its fitness."""
+        wanted = (*DESCRIPTORS, *self.task.descriptors, *self.optimizer.measures)
+        return tuple(dict.fromkeys(wanted))
 
     @property
     def budget(self) -> int:

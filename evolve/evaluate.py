@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evolve.config import RunConfig
-from evolve.fitness import FITNESS, Trial
+from evolve.fitness import FITNESS, SAMPLES_PER_CYCLE, Trial
 from evolve.scores import Scores
-from evolve.second_look import SecondLook, perturbed, quantile, share
-from evolve.streams import Streams
+from evolve.second_look import SecondLook, quantile, share
+from evolve.streams import Role, Streams
+from evolve.trials import aggregate, perturbed, scattered
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -27,12 +29,10 @@ class Evaluator:
     threads.
     """
 
-    descriptors = ("displacement_x", "displacement_y", "height")
-    """Measured beside the fitness: way of the centre of mass in x and y, its height at the end
-    [m]; NaN for a robot that was stopped."""
-
     def __init__(self, config: RunConfig) -> None:
         self.task = config.task
+        self.descriptors = config.descriptors
+        """Names of what is measured beside the fitness."""
         self.simulation = config.simulation
         self.scene = config.scene.build()
         self.streams = Streams(config.seed)
@@ -44,17 +44,50 @@ class Evaluator:
     def __call__(self, robots: Sequence[ws.Robot]) -> Scores:
         """Simulate the robots, all at once, and score them."""
         started = time.perf_counter()
-        simulation = self._simulate(robots)
-        trial = self._trial(simulation)
+        if self.task.trials.count == 1:
+            scores = self._score(robots, robots, self.scene)
+        else:
+            scores = self._mean(list(self._several(robots)))
+        return replace(scores, wall_time=time.perf_counter() - started)
+
+    def _several(self, robots: Sequence[ws.Robot]) -> Iterator[Scores]:
+        """Scores of each of the trials: a floor of its own, starts of their own."""
+        settings = self.task.trials
+        starts = scattered(robots, settings, self.streams, settings.count)
+        spread = np.linspace(-settings.friction, settings.friction, settings.count)
+        for start, change in zip(starts, spread, strict=True):
+            yield self._score(start, robots, _rougher(self.scene, 1.0 + float(change)))
+
+    def _mean(self, trials: Sequence[Scores]) -> Scores:
+        """One score for each robot from those of its trials."""
+        status = np.stack([trial.status for trial in trials])
+        first = np.argmax(status != 0, axis=0)
+        return Scores(
+            fitness=aggregate(
+                np.stack([trial.fitness for trial in trials]), self.task.trials.aggregate
+            ),
+            status=np.take_along_axis(status, first[None], axis=0)[0],
+            descriptors={
+                name: np.mean([trial.descriptors[name] for trial in trials], axis=0)
+                for name in self.descriptors
+            },
+            spring_evaluations=np.sum([trial.spring_evaluations for trial in trials], axis=0),
+        )
+
+    def _score(
+        self, starts: Sequence[ws.Robot], robots: Sequence[ws.Robot], scene: ws.Scene
+    ) -> Scores:
+        """Scores of one trial of robots that begin it as `starts`."""
+        simulation = self._simulate(starts, scene=scene)
+        # Measures look at a robot as it was built, not as it was bent for the start.
+        trial = self._trial(simulation, robots)
         status = np.asarray(trial.measured.status, dtype=np.int64)
-        way, height = trial.displacement, trial.measured.center_of_mass[:, 2]
-        descriptors = zip(self.descriptors, (way[:, 0], way[:, 1], height), strict=True)
+        found = {name: FITNESS[name](trial) for name in self.descriptors}
         return Scores(
             fitness=FITNESS[self.task.fitness](trial),
             status=status,
-            descriptors={k: np.where(status == 0, v, np.nan) for k, v in descriptors},
+            descriptors={k: np.where(status == 0, v, np.nan) for k, v in found.items()},
             spring_evaluations=_costs(trial, simulation.robot_dt),
-            wall_time=time.perf_counter() - started,
         )
 
     def prepare(self, robots: Sequence[ws.Robot]) -> None:
@@ -78,7 +111,11 @@ class Evaluator:
             alike = np.flatnonzero(dt == step)
             again = self._simulate([robots[i] for i in alike], float(step), "float64")
             halved[alike] = self._fitness(self._trial(again))
-        starts = [s for robot in robots for s in perturbed(robot, settings, self.streams)]
+        starts = [
+            start
+            for robot in robots
+            for start in perturbed(robot, settings, self.streams, Role.SECOND_LOOK, settings.trials)
+        ]
         # The fitness measures a robot as it was built, not as it was bent for the start.
         built = [robot for robot in robots for _ in range(settings.trials)]
         trials = self._fitness(self._trial(self._simulate(starts), built))
@@ -98,29 +135,51 @@ class Evaluator:
 
     def _trial(self, simulation: ws.Simulation, robots: Sequence[ws.Robot] | None = None) -> Trial:
         """Run a trial; `robots` is whom to measure if not who was simulated."""
+        used = [FITNESS[name] for name in (self.task.fitness, *self.descriptors)]
+        energy = any(measure.needs_energy for measure in used)
+        count = 1
+        if any(measure.needs_path for measure in used):
+            count = max(2, round(SAMPLES_PER_CYCLE * self.task.measure))
         settled = simulation.run(self.settle)
-        measured = simulation.run(self.measure)
-        return Trial(simulation.robots if robots is None else robots, settled, measured)
+        # Each piece ends at the step next to where it should, so that no error adds up.
+        ends = self.settle + self.measure * np.arange(1, count + 1) / count
+        pieces = [simulation.run(end - simulation.time, energy=energy) for end in ends]
+        direction = np.array(self.task.direction) / np.hypot(*self.task.direction)
+        return Trial(
+            simulation.robots if robots is None else robots, settled, pieces, tuple(direction)
+        )
 
     def _simulate(
         self,
         robots: Sequence[ws.Robot],
         dt: float | None = None,
         precision: str | None = None,
+        scene: ws.Scene | None = None,
     ) -> ws.Simulation:
-        """Pack robots, with the step and the precision of the configuration unless told."""
+        """Pack robots, with the step, precision and scene of the configuration unless told."""
         import warp_springs as ws
 
         settings = self.simulation
         return ws.Simulation(
             robots,
-            self.scene,
+            self.scene if scene is None else scene,
             dt=settings.dt if dt is None else dt,
             precision=settings.precision if precision is None else precision,
             integrator=settings.integrator,
             device=settings.device,
             threads=settings.threads,
         )
+
+
+def _rougher(scene: ws.Scene, factor: float) -> ws.Scene:
+    """The scene with so many times the friction."""
+    ground = scene.ground
+    if ground is None or factor == 1.0:
+        return scene
+    coefficients = {
+        name: factor * getattr(ground, name) for name in ("static_friction", "kinetic_friction")
+    }
+    return replace(scene, ground=replace(ground, **coefficients))
 
 
 def _costs(trial: Trial, dt: np.ndarray) -> np.ndarray:
@@ -132,5 +191,5 @@ def _costs(trial: Trial, dt: np.ndarray) -> np.ndarray:
     springs = robots.body.n_springs if fixed else [robot.n_springs for robot in robots]
     times = np.where(np.asarray(trial.measured.status) == 0, end, trial.measured.status_time)
     weights = np.asarray(springs) * times / dt
-    total = trial.settled.spring_evaluations + trial.measured.spring_evaluations
+    total = sum(result.spring_evaluations for result in (trial.settled, *trial.pieces))
     return np.rint(total * (weights / max(weights.sum(), 1e-300))).astype(np.int64)

@@ -1,8 +1,14 @@
-"""Fitness functions: what a robot is selected for, read off the results of its trial.
+"""Fitness: what robots are selected for and described by, read off the results of their trial.
 
-A fitness is a function of a `Trial` that returns one number for each robot, higher is better, and
-one line in `FITNESS`; its name there is its name in a run's configuration. A fitness need not
-look at the status: whoever was stopped gets no fitness whatever the function says.
+A measure is a function of a `Trial` that gives one number for each robot::
+
+    @measure("m")
+    def rise(trial):
+        return trial.measured.center_of_mass[:, 2]
+
+Its name can stand as `task.fitness` of a run's configuration (higher is better), among
+`task.descriptors`, and among the objectives of an optimizer. A measure need not look at the status:
+whoever was stopped gets no fitness whatever it says.
 """
 
 from __future__ import annotations
@@ -16,7 +22,10 @@ import numpy as np
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["FITNESS", "Fitness", "Trial", "body_diameters", "distance", "omegas", "speed"]
+__all__ = ["FITNESS", "UNITS", "Measure", "Trial", "body_diameters", "measure", "omegas"]
+
+SAMPLES_PER_CYCLE = 20
+"""How often a measure that needs the path sees the centre of mass."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +35,15 @@ class Trial:
     robots: Sequence[ws.Robot]
     settled: ws.Result
     """At the end of the settling time, where the measurement starts."""
-    measured: ws.Result
-    """At the end of the measurement."""
+    pieces: Sequence[ws.Result]
+    """The measurement, in one piece or in several that follow each other."""
+    direction: tuple[float, float] = (1.0, 0.0)
+    """Where forward is: a vector over the ground of length one."""
+
+    @property
+    def measured(self) -> ws.Result:
+        """At the end of the measurement."""
+        return self.pieces[-1]
 
     @property
     def displacement(self) -> np.ndarray:
@@ -35,29 +51,171 @@ class Trial:
         return self.measured.center_of_mass - self.settled.center_of_mass
 
     @property
+    def path(self) -> np.ndarray:
+        """Centre of mass at the start and after each of K pieces [m], shape (N, K + 1, 3)."""
+        return np.stack([r.center_of_mass for r in (self.settled, *self.pieces)], axis=1)
+
+    @property
+    def work(self) -> np.ndarray:
+        """Net work of the breathing springs during the measurement [J], shape (N,)."""
+        return sum(piece.energy.work[:, -1] for piece in self.pieces)
+
+    @property
     def duration(self) -> float:
         """Length of the measurement [s]."""
         return self.measured.end_time - self.settled.end_time
 
-
-Fitness = Callable[[Trial], np.ndarray]
-
-
-def distance(trial: Trial) -> np.ndarray:
-    """Net distance of the centre of mass over the ground, straight from start to end [m]."""
-    return np.hypot(trial.displacement[:, 0], trial.displacement[:, 1])
+    @property
+    def cycles(self) -> np.ndarray:
+        """Actuation cycles in the measurement, shape (N,)."""
+        return np.abs(omegas(self.robots)) * self.duration / (2.0 * np.pi)
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A figure of every robot of a trial, and what must be recorded to know it."""
+
+    function: Callable[[Trial], np.ndarray]
+    unit: str
+    needs_path: bool
+    needs_energy: bool
+
+    def __call__(self, trial: Trial) -> np.ndarray:
+        """The figure of each robot, shape (N,)."""
+        return np.asarray(self.function(trial), np.float64)
+
+    @property
+    def about(self) -> str:
+        """What it is, in a line."""
+        return (self.function.__doc__ or "").partition("\n")[0]
+
+
+FITNESS: dict[str, Measure] = {}
+"""Name in the configuration -> measure."""
+
+UNITS: dict[str, str] = {}
+"""What the figures of each measure are measured in, for plots and reports."""
+
+
+def measure(
+    unit: str, path: bool = False, energy: bool = False
+) -> Callable[[Callable[[Trial], np.ndarray]], Measure]:
+    """Register a function of a trial under its name.
+
+    Args:
+        unit: Of its figures.
+        path: Whether it reads `Trial.path` between its ends: `SAMPLES_PER_CYCLE` pieces a cycle.
+        energy: Whether it reads `Trial.work`, or energies of the results.
+    """
+
+    def register(function: Callable[[Trial], np.ndarray]) -> Measure:
+        found = Measure(function, unit, path, energy)
+        FITNESS[function.__name__] = found
+        UNITS[function.__name__] = unit
+        return found
+
+    return register
+
+
+@measure("body diameters per cycle")
 def speed(trial: Trial) -> np.ndarray:
-    """Speed over the ground in body diameters per actuation cycle.
+    """Speed over the ground in body diameters per actuation cycle, in any direction.
 
     The net horizontal distance of the centre of mass, divided by the largest distance between two
     masses of the body at rest and by the number of cycles 2 pi / omega that it took. A robot that
     does not cycle (omega = 0) has speed 0.
     """
-    cycles = np.abs(omegas(trial.robots)) * trial.duration / (2.0 * np.pi)
-    lengths = distance(trial) / body_diameters(trial.robots)
-    return np.divide(lengths, cycles, out=np.zeros_like(lengths), where=cycles > 0.0)
+    return _per_diameter_and_cycle(distance(trial), trial)
+
+
+@measure("body diameters per cycle")
+def forward(trial: Trial) -> np.ndarray:
+    """Speed along `task.direction` in body diameters per actuation cycle; negative backwards."""
+    way = trial.displacement[:, :2]
+    along = way[:, 0] * trial.direction[0] + way[:, 1] * trial.direction[1]
+    return _per_diameter_and_cycle(along, trial)
+
+
+@measure("m")
+def distance(trial: Trial) -> np.ndarray:
+    """Net distance of the centre of mass over the ground, straight from start to end."""
+    return np.hypot(trial.displacement[:, 0], trial.displacement[:, 1])
+
+
+@measure("m", path=True)
+def jump(trial: Trial) -> np.ndarray:
+    """Highest rise of the centre of mass above where it was after settling."""
+    height = trial.path[:, :, 2]
+    return height.max(axis=1) - height[:, 0]
+
+
+@measure("m/J", energy=True)
+def economy(trial: Trial) -> np.ndarray:
+    """Net distance for every joule that the springs worked."""
+    work = np.abs(trial.work)
+    return np.divide(distance(trial), work, out=np.zeros_like(work), where=work > 0.0)
+
+
+@measure("J", energy=True)
+def energy(trial: Trial) -> np.ndarray:
+    """Net work of the breathing springs."""
+    return np.abs(trial.work)
+
+
+@measure("m/s^2", path=True)
+def smoothness(trial: Trial) -> np.ndarray:
+    """Less is rougher: minus the rms acceleration of the centre of mass, a twentieth of a cycle."""
+    interval = trial.duration / len(trial.pieces)
+    acceleration = np.diff(trial.path, n=2, axis=1) / interval**2
+    return -np.sqrt((acceleration**2).sum(axis=2).mean(axis=1))
+
+
+@measure("", path=True)
+def straightness(trial: Trial) -> np.ndarray:
+    """Net distance over the ground divided by the length of the way: 1 is straight."""
+    steps = np.linalg.norm(np.diff(trial.path[:, :, :2], axis=1), axis=2).sum(axis=1)
+    return np.divide(distance(trial), steps, out=np.zeros_like(steps), where=steps > 0.0)
+
+
+@measure("m")
+def displacement_x(trial: Trial) -> np.ndarray:
+    """Way of the centre of mass along x."""
+    return trial.displacement[:, 0]
+
+
+@measure("m")
+def displacement_y(trial: Trial) -> np.ndarray:
+    """Way of the centre of mass along y."""
+    return trial.displacement[:, 1]
+
+
+@measure("m")
+def height(trial: Trial) -> np.ndarray:
+    """Height of the centre of mass at the end."""
+    return trial.measured.center_of_mass[:, 2]
+
+
+@measure("kg")
+def mass(trial: Trial) -> np.ndarray:
+    """Mass of the body."""
+    import warp_springs as ws
+
+    robots = trial.robots
+    if isinstance(robots, ws.Variants):
+        return robots.array("masses").sum(axis=1)
+    return np.array([robot.mass for robot in robots])
+
+
+@measure("m")
+def diameter(trial: Trial) -> np.ndarray:
+    """Largest distance between two masses of the body at rest."""
+    return body_diameters(trial.robots)
+
+
+@measure("springs")
+def springs(trial: Trial) -> np.ndarray:
+    """Number of springs of the body."""
+    return np.array([float(robot.n_springs) for robot in trial.robots])
 
 
 def omegas(robots: Sequence[ws.Robot]) -> np.ndarray:
@@ -78,8 +236,6 @@ def body_diameters(robots: Sequence[ws.Robot]) -> np.ndarray:
     return np.array([robot.diameter for robot in robots])
 
 
-FITNESS: dict[str, Fitness] = {"speed": speed, "distance": distance}
-"""Name in the configuration -> function."""
-
-UNITS: dict[str, str] = {"speed": "body diameters per cycle", "distance": "m"}
-"""What the figures of each fitness are measured in, for plots and reports."""
+def _per_diameter_and_cycle(way: np.ndarray, trial: Trial) -> np.ndarray:
+    lengths, cycles = way / body_diameters(trial.robots), trial.cycles
+    return np.divide(lengths, cycles, out=np.zeros_like(lengths), where=cycles > 0.0)

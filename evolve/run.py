@@ -24,7 +24,6 @@ import numpy as np
 
 from evolve.config import RunConfig
 from evolve.errors import RunError, StoreError
-from evolve.evaluate import Evaluator
 from evolve.lock import Lock
 from evolve.search import Generation, Search
 from evolve.store import Store, Timing
@@ -145,7 +144,7 @@ class Run:
             RunError: run.toml was changed since the record was begun.
         """
         meta = {"config": dump(self.config), **_origin()}
-        with self._locked(), Store.create(self.record_path, meta, Evaluator.descriptors) as store:
+        with self._locked(), Store.create(self.record_path, meta, self.config.descriptors) as store:
             self._check_unchanged(store)
             with suppress(StoreError), self.exporting():
                 pass  # entering it tidies up, unless somebody is at work there

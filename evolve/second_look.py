@@ -8,19 +8,11 @@ which a lucky fall does not survive.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from evolve.streams import Role, Streams
-
-if TYPE_CHECKING:
-    import warp_springs as ws
-    from evolve.config import SecondLookConfig
-
-__all__ = ["SecondLook", "perturbed", "quantile", "share"]
+__all__ = ["SecondLook", "quantile", "share"]
 
 
 @dataclass(frozen=True)
@@ -39,30 +31,6 @@ class SecondLook:
     """That fitness divided by the first one, shape (n,)."""
     survives: np.ndarray
     """Whether enough is left of both, shape (n,), bool."""
-
-
-def perturbed(robot: ws.Robot, settings: SecondLookConfig, streams: Streams) -> Iterator[ws.Robot]:
-    """Yield the robot at the start of each of its perturbed trials.
-
-    It is turned about the vertical through its centre of mass; every mass is displaced and
-    pushed; then it is lifted so far that its lowest mass is no deeper than before, or somewhat
-    higher, for a mass that starts within the ground would be shot out of it. Rest lengths stay.
-    Trial t draws from a stream of its own, the same for every robot: the outcome depends neither
-    on which robots are looked at nor on how many.
-    """
-    lengths = robot.lengths
-    shortest = lengths[lengths > 0.0].min(initial=robot.diameter)
-    floor = robot.bounds[0, 2]
-    for trial in range(settings.trials):
-        rng = streams(0, Role.SECOND_LOOK, trial)
-        angle = rng.uniform(-settings.rotation, settings.rotation)
-        rise = rng.uniform(0.0, settings.height * shortest)
-        displacements = settings.position * shortest * rng.standard_normal((robot.n_masses, 3))
-        pushes = settings.velocity * rng.standard_normal((robot.n_masses, 3))
-        turned = robot.rotated((0.0, 0.0, 1.0), angle)
-        positions = turned.positions + displacements
-        positions[:, 2] += floor + rise - positions[:, 2].min()
-        yield turned.replace(positions=positions, velocities=turned.velocities + pushes)
 
 
 def quantile(fitness: np.ndarray, level: float) -> np.ndarray:

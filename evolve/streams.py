@@ -18,6 +18,7 @@ class Role(IntEnum):
     CROSSOVER = 2
     MUTATION = 3
     SECOND_LOOK = 4
+    TRIAL = 5
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,11 @@ class OptimizerSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Names of the measures that it looks at beside the fitness."""
+        return ()
+
 
 @dataclass(frozen=True)
 class Candidates:

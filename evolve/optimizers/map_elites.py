@@ -31,6 +31,11 @@ class MapElitesSettings(VariationSettings):
     crossover_rate: float = Field(0.3, ge=0.0, le=1.0)
     """Share of the children with two parents; the others have one."""
 
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """What spans the grid."""
+        return self.descriptors
+
     @model_validator(mode="after")
     def _fits(self) -> MapElitesSettings:
         count = len(self.descriptors)

@@ -26,6 +26,12 @@ class Nsga2Settings(SelectionSettings, VariationSettings):
     tournament: int = Field(2, ge=1)
     """How many individuals compete to become a parent; 1 = no preference. For "tournament"."""
 
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The objectives that are not the fitness."""
+        names = (name.removeprefix("-") for name in self.objectives)
+        return tuple(name for name in names if name != "fitness")
+
 
 class Nsga2(PopulationOptimizer):
     """Deb et al. (2002): the better Pareto front survives, of the last front the lonelier."""

@@ -110,7 +110,10 @@ MISTAKES = [
         {"task.second_look.trails": 3},
         "unknown key task.second_look.trails (did you mean 'trials'?)",
     ),
-    ({"task.fitness": "sped"}, "task.fitness: input should be 'speed' or 'distance'"),
+    (
+        {"task.fitness": "sped"},
+        "task.fitness: expected measures, which are diameter, displacement_x,",
+    ),
     ({"name": "../up"}, "name: string should match pattern"),
     ({"seed.x": 1}, "seed: input should be a valid integer"),
     ({"name.x": 1}, "name.x: name is a value, not a table"),

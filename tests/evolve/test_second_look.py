@@ -10,10 +10,11 @@ from evolve.evaluate import Evaluator
 from evolve.export import crown
 from evolve.report import verdict
 from evolve.run import Run
-from evolve.second_look import perturbed, quantile, share
+from evolve.second_look import quantile, share
 from evolve.store import Store
-from evolve.streams import Streams
+from evolve.streams import Role, Streams
 from evolve.toml import load
+from evolve.trials import perturbed
 from tests.evolve.conftest import TINY
 
 NO_PERTURBATION = {
@@ -120,8 +121,10 @@ def test_trials_without_perturbation_repeat_the_first_look():
 def test_perturbed_starts_are_small_different_and_stand_on_the_ground():
     settings = SecondLookConfig(trials=50)
     robot = ws.shapes.cube(edge=0.2).moved((1.0, 2.0, 0.0)).moving((0.5, 0.0, 0.0))
-    starts = list(perturbed(robot, settings, Streams(1)))
-    assert len(starts) == 50 and starts == list(perturbed(robot, settings, Streams(1)))
+    starts = list(perturbed(robot, settings, Streams(1), Role.SECOND_LOOK, 50))
+    assert len(starts) == 50 and starts == list(
+        perturbed(robot, settings, Streams(1), Role.SECOND_LOOK, 50)
+    )
     lowest = np.array([start.bounds[0, 2] for start in starts])
     assert (lowest > -1e-12).all() and 0.001 < lowest.max() <= 0.002
     moves = np.array([start.positions - robot.positions for start in starts])
@@ -132,7 +135,7 @@ def test_perturbed_starts_are_small_different_and_stand_on_the_ground():
     for start in starts:
         np.testing.assert_array_equal(start.rest_length, robot.rest_length)
     only_turned = SecondLookConfig(position=0.0, velocity=0.0, height=0.0)
-    for start in perturbed(robot, only_turned, Streams(1)):
+    for start in perturbed(robot, only_turned, Streams(1), Role.SECOND_LOOK, only_turned.trials):
         np.testing.assert_allclose(start.lengths, robot.lengths)
         np.testing.assert_allclose(start.center_of_mass, robot.center_of_mass)
 
@@ -140,7 +143,7 @@ def test_perturbed_starts_are_small_different_and_stand_on_the_ground():
 def test_a_body_of_coincident_masses_has_a_shortest_spring_too():
     cube = ws.shapes.cube()
     folded = cube.replace(positions=cube.positions * (1.0, 1.0, 0.0))
-    (start,) = perturbed(folded, SecondLookConfig(trials=1), Streams(1))
+    (start,) = perturbed(folded, SecondLookConfig(), Streams(1), Role.SECOND_LOOK, 1)
     assert (np.ptp(start.positions, axis=0) > np.ptp(folded.positions, axis=0)).any()
 
 
