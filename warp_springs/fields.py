@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import operator
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -27,6 +28,7 @@ __all__ = [
     "is_frozen",
     "require_positive",
     "require_vector",
+    "require_whole",
     "settled",
 ]
 
@@ -279,3 +281,14 @@ def require_vector(name: str, value: ArrayLike) -> FloatArray:
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r}: must be three finite numbers")
     return array
+
+
+def require_whole(name: str, value: int, least: int) -> int:
+    """A parameter as an int, refused with a ValueError unless whole and not below `least`."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if number < least or isinstance(value, bool):
+        raise ValueError(f"{name} = {value!r}: must be a whole number of {least} or more")
+    return number

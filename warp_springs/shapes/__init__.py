@@ -4,7 +4,20 @@ All are at rest and not actuated, and their springs have their initial lengths.
 """
 
 from warp_springs.shapes.convex import octahedron, tetrahedron
+from warp_springs.shapes.filled import filled, sphere
+from warp_springs.shapes.rods import beam, chain
 from warp_springs.shapes.scattered import random_lattice
 from warp_springs.shapes.voxels import cube, lattice, voxels
 
-__all__ = ["cube", "lattice", "octahedron", "random_lattice", "tetrahedron", "voxels"]
+__all__ = [
+    "beam",
+    "chain",
+    "cube",
+    "filled",
+    "lattice",
+    "octahedron",
+    "random_lattice",
+    "sphere",
+    "tetrahedron",
+    "voxels",
+]

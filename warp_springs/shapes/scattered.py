@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import operator
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_springs.fields import require_positive
+from warp_springs.fields import require_positive, require_whole
 from warp_springs.geometry import FloatArray, spring_lengths
 from warp_springs.robot import Robot
 from warp_springs.shapes.points import pairs_within, scattered_points
@@ -55,11 +53,13 @@ def random_lattice(
     spacing = require_positive("spacing", spacing)
     if not (np.isfinite(reach) and reach >= 1.0):
         raise ValueError(f"reach = {reach!r}: must be a number of spacings, at least 1")
-    points = scattered_points(low, high, spacing, np.random.default_rng(_whole("seed", seed, 0)))
+    points = scattered_points(
+        low, high, spacing, np.random.default_rng(require_whole("seed", seed, 0))
+    )
     if n_springs is None:
         springs = pairs_within(points, reach * spacing)
     else:
-        springs = _closest_pairs(points, _whole("n_springs", n_springs, 1), reach * spacing)
+        springs = _closest_pairs(points, require_whole("n_springs", n_springs, 1), reach * spacing)
     return Robot(
         masses=require_positive("mass", mass) / len(points),
         positions=points,
@@ -93,13 +93,3 @@ def _box(bounds: ArrayLike) -> FloatArray:
             "corner, finite and larger than zero along each axis"
         )
     return box
-
-
-def _whole(name: str, value: int, least: int) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = least - 1
-    if number < least or isinstance(value, bool):
-        raise ValueError(f"{name} = {value!r}: must be a whole number of {least} or more")
-    return number
