@@ -49,8 +49,10 @@ __all__ = [
     "Water",
     "Waveform",
     "damping_rate",
+    "export_html",
     "export_usd",
     "height_map",
+    "html_page",
     "materials",
     "plots",
     "quiet",
@@ -66,7 +68,9 @@ except PackageNotFoundError:  # a source tree that was never installed
 
 # Names whose modules need pxr, matplotlib or Pillow: loaded on first use.
 _LAZY = {
+    "export_html": ("warp_springs.view.page", "export_html"),
     "export_usd": ("warp_springs.io.usd", "export_usd"),
+    "html_page": ("warp_springs.view.page", "html_page"),
     "plots": ("warp_springs.view.plots", None),
     "render": ("warp_springs.view.picture", "render"),
 }

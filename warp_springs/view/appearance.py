@@ -14,6 +14,12 @@ TENSION = (0.76, 0.012, 0.012)
 """Colour of a bar stretched to the stress scale or beyond."""
 COMPRESSION = (0.012, 0.06, 0.76)
 """Colour of a bar compressed to the stress scale or beyond."""
+LONGER = (0.83, 0.30, 0.02)
+"""Colour of a bar told to be as long as any is, or longer."""
+SHORTER = (0.01, 0.30, 0.26)
+"""Colour of a bar told to be as short as any is, or shorter."""
+PUSH = (0.86, 0.36, 0.01)
+"""Colour of the arrows that stand for external forces."""
 MASS = (0.012, 0.013, 0.016)
 """Colour of the spheres that stand for masses."""
 SKIN = (0.26, 0.47, 0.66)
@@ -32,6 +38,7 @@ STRESS_STEPS = 32
 LEAST_STRESS_SCALE = 1e-6
 """Force in N below which no spring is coloured: rounding errors are not stress."""
 
+_TILE_PER_SIZE = 0.45
 _BAR_PER_LENGTH = 0.042
 _BALL_PER_BAR = 1.9
 _LENGTH_WITHOUT_SPRINGS = 0.1
@@ -101,6 +108,18 @@ def drawn_radii(rest_length: ArrayLike) -> tuple[float, float]:
         typical = _LENGTH_WITHOUT_SPRINGS
     bar = _BAR_PER_LENGTH * typical
     return bar, _BALL_PER_BAR * bar
+
+
+def tile_size(sizes: ArrayLike) -> float:
+    """Return the edge in m of the floor's tiles under robots of some sizes (R,), their diagonals.
+
+    It is the largest of 1, 2, 5 times a power of ten that is not above 0.45 of the median size.
+    """
+    length = _TILE_PER_SIZE * float(np.median(sizes))
+    if not length > 0.0:
+        return 0.1
+    power = 10.0 ** np.floor(np.log10(length * (1 + 1e-9)))
+    return float(power * max(n for n in (1, 2, 5) if n * power <= length * (1 + 1e-9)))
 
 
 def grid_offsets(

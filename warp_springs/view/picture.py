@@ -24,7 +24,6 @@ COLORS = ("stress", "plain")
 """What the colour of a bar may say."""
 
 _FRAMES_FOR_SCALE = 64
-_TILE_PER_SIZE = 0.45
 _VIEW_OF_ONE = {"azimuth": -58.0, "elevation": 25.0, "margin": 1.6}
 _VIEW_OF_MANY = {"azimuth": -64.0, "elevation": 28.0, "margin": 1.2}
 _LABEL_INK = (28, 32, 38)
@@ -210,7 +209,7 @@ def arrange(poses: Sequence[Pose], *, skin: bool = True, floor: bool = True) -> 
         ball_radius=np.repeat([p.ball_radius for p in poses], counts),
         ball_color=np.tile(np.float32(appearance.MASS), (masses, 1)),
         floor=-max(p.ball_radius for p in poses) if floor else None,
-        tile=_round_length(_TILE_PER_SIZE * float(np.median(sizes))),
+        tile=appearance.tile_size(sizes),
     )
 
 
@@ -253,14 +252,6 @@ def _stress_scale(result: Result, robot: int, positions: NDArray, time: float) -
         frames, times = result.frames(robot)[::step], result.times[::step]
         return appearance.stress_scale(body.tension(frames, times))
     return appearance.stress_scale(body.tension(positions, time))
-
-
-def _round_length(length: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above the length in m."""
-    if not length > 0.0:
-        return 0.1
-    power = 10.0 ** np.floor(np.log10(length * (1 + 1e-9)))
-    return float(power * max(n for n in (1, 2, 5) if n * power <= length * (1 + 1e-9)))
 
 
 def _checked_robots(
