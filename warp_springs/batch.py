@@ -27,6 +27,7 @@ from warp_springs.packing import (
     largest,
     longest_springs,
     not_finite,
+    row_pairs,
     sort_rows,
 )
 from warp_springs.robot import Robot
@@ -40,6 +41,7 @@ __all__ = ["Batch", "Group", "Slots"]
 PACKED = (
     "rows",
     "partners",
+    "pairs",
     "inverse_masses",
     "coefficients",
     "omegas",
@@ -209,6 +211,8 @@ class Batch:
         order, row, partner = sort_rows(strip)
         self._append("rows", row)
         self._append("partners", partner)
+        if width > 1:
+            self._append("pairs", row_pairs(row, partner))
         fields, one = strip.fields, np.ones(n, np.int64)
         turn = fields["omega"] * method.spans(levels)
         oscillators = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
@@ -251,6 +255,7 @@ class Batch:
             "lane": ("omegas", np.full(len(masses), width)),
             "row": ("rows", 0 * masses if strip.shared else masses + 1),
             "partner": ("partners", 0 * counts if strip.shared else counts),
+            "pair": ("pairs", 0 * counts),
         }
         table = {
             column: self._sizes[buffer] + np.cumsum(sizes) - sizes

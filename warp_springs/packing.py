@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +20,7 @@ __all__ = [
     "largest",
     "longest_springs",
     "not_finite",
+    "row_pairs",
     "sort_rows",
 ]
 
@@ -89,7 +92,7 @@ class Strip:
 
 
 def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]:
-    """Springs in rows by their lower mass.
+    """Springs in rows by their lower mass, in each row by the higher one.
 
     Returns:
         ``order``: all springs of all robots, sorted into rows, robot by robot;
@@ -101,8 +104,9 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     mass_start, spring_start = np.cumsum(masses) - masses, np.cumsum(counts) - counts
     lower, higher = np.sort(strip.springs, axis=1).T
     lower = lower + np.repeat(mass_start, counts)
-    in_rows = (lower[1:] >= lower[:-1]).all()  # as the shapes make them: nothing to copy
-    order = slice(None) if in_rows and not strip.shared else np.argsort(lower, kind="stable")
+    step, along = np.diff(lower), np.diff(higher)
+    in_rows = ((step > 0) | ((step == 0) & (along >= 0))).all()  # as the shapes make them
+    order = slice(None) if in_rows and not strip.shared else np.lexsort((higher, lower))
     partner = higher[order]
 
     ends = np.cumsum(np.bincount(lower, minlength=masses.sum()))  # where the row of a mass ends
@@ -116,20 +120,53 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     return order, row.astype(np.int32), partner.astype(np.int32)
 
 
+def row_pairs(row: np.ndarray, partner: np.ndarray) -> np.ndarray:
+    """How two rows at a time share their partners: what ``kernels.bundle`` steps through.
+
+    For the masses 0 and 1, 2 and 3, ... of one topology: a number of runs, and for each run how
+    many springs of the first mass alone, of both masses to the same partners, and of the second
+    mass alone follow each other. Springs between the two masses come first and are not counted.
+    """
+    code: list[int] = []
+    rows = [partner[a:b].tolist() for a, b in itertools.pairwise(row.tolist())]
+    for i in range(0, len(rows) - 1, 2):
+        first, second = [j for j in rows[i] if j != i + 1], rows[i + 1]
+        kinds, a, b = [], 0, 0
+        while a < len(first) or b < len(second):
+            of_first, of_second = _at(first, a), _at(second, b)
+            # Of several springs to one partner the last is shared: all of the first row come first.
+            kind = 2 if of_first > of_second else int(of_first == of_second != _at(first, a + 1))
+            kinds.append(kind)
+            a, b = a + (kind < 2), b + (kind > 0)
+        runs = []
+        for at, kind in enumerate(kinds):
+            if at == 0 or kind < kinds[at - 1]:
+                runs.append([0, 0, 0])
+            runs[-1][kind] += 1
+        code += [len(runs), *itertools.chain.from_iterable(runs)]
+    return np.array(code, np.int32)
+
+
+def _at(values: Sequence[int], index: int) -> float:
+    return values[index] if index < len(values) else math.inf
+
+
 def coefficients(
     fields: dict[str, np.ndarray], order: np.ndarray | slice, actuated: bool
 ) -> np.ndarray:
-    """Coefficients of the sorted springs: k and q = k L0, shape (total, 2), or, if they breathe,
-    k, qa, qs, qc with q(t) = qa + qs sin(wt) + qc cos(wt), shape (total, 4).
+    """Coefficients of the sorted springs: k and h = k L0 / 2, shape (total, 2), or, if they
+    breathe, k, ha, hs, hc with h(t) = ha + hs sin(wt) + hc cos(wt), shape (total, 4).
 
-    From L0(t) = a + b sin(wt + c) = a + (b cos c) sin(wt) + (b sin c) cos(wt).
+    From L0(t) = a + b sin(wt + c) = a + (b cos c) sin(wt) + (b sin c) cos(wt). The half belongs to
+    the Newton step of the inverse square root, see ``kernels.law``.
     """
     k = fields["stiffness"][order]
     table = np.empty((len(k), 4 if actuated else 2))
     table[:, 0] = k
-    np.multiply(k, fields["rest_length"][order], out=table[:, 1])
+    half = 0.5 * k
+    np.multiply(half, fields["rest_length"][order], out=table[:, 1])
     if actuated:
-        kb, c = k * fields["amplitude"][order], fields["phase"][order]
+        kb, c = half * fields["amplitude"][order], fields["phase"][order]
         np.multiply(kb, np.cos(c), out=table[:, 2])
         np.multiply(kb, np.sin(c), out=table[:, 3])
     return table

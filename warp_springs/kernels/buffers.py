@@ -18,6 +18,7 @@ BUNDLE = (
     "lane",  # one value a lane: [W]
     "row",  # row starts, M + 1 of them, counted from 0
     "partner",  # the higher mass of each spring, S of them
+    "pair",  # how two rows at a time share their partners
     "masses",
     "springs",
     "substeps",  # of the contact flow
@@ -31,8 +32,9 @@ MODEL = {
     "constants": np.float64,  # a row for each size of step, see kernels.law
     "rows": np.int32,
     "partners": np.int32,
+    "pairs": np.int32,  # see packing.row_pairs
     "inverse_masses": REAL,  # 1/kg
-    "coefficients": REAL,  # k, q, or k, qa, qs, qc of each sorted spring: N/m, N
+    "coefficients": REAL,  # k, h, or k, ha, hs, hc of each sorted spring: N/m, N
     "omegas": np.float64,  # rad/s
     "reaches2": REAL,  # square of the length that stops a robot, m^2
 }

@@ -73,6 +73,7 @@ const real* const w = (const real*)(model.inverse_masses.data + mass_);
 const real* const p = (const real*)(model.coefficients.data + spring_);
 const int* const row = model.rows.data + row_;
 const int* const partner = model.partners.data + partner_;
+const int* const pairs = model.pairs.data + pair_;
 real& sine = *(real*)(state.oscillators.data + 4 * lane_);
 real& cosine = *(real*)(state.oscillators.data + 4 * lane_ + W);
 const real turn_cosine = *(const real*)(state.oscillators.data + 4 * lane_ + 2 * W);
@@ -93,8 +94,21 @@ real* const ledger = (real*)(state.ledgers.data + 8 * lane_);
 real* const good_ledger = ledger + 4;
 real power = zero;
 
-auto stiffness_times_rest = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
+// Half the stiffness times the rest length, at an instant.
+auto half_rest_force = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
+};
+// The force of spring s on its first mass, at a, whose other mass is at b.
+auto spring_force = [&](Vec a, Vec b, int s, real si, real co)
+        __attribute__((always_inline)) -> Vec {
+    const Vec d = b - a;
+    const real length2 = squared_length(d.x, d.y, d.z), k = stiffness(s);
+    const real h = half_rest_force(s, si, co);
+    if (LEDGER && ACTUATED)
+        power += breathing_power(length2, k, h,
+                                 breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega));
+    const real pull = spring_pull(length2, k, h);
+    return Vec{pull * d.x, pull * d.y, pull * d.z};
 };
 // The whole force on mass i where the masses are at x; forces on later masses are left in F.
 auto row_force = [&](const Vec* x, int i, real si, real co)
@@ -104,16 +118,9 @@ auto row_force = [&](const Vec* x, int i, real si, real co)
     F[i] = Vec{zero, zero, zero};
     for (int s = row[i]; s < row[i + 1]; ++s) {
         const int j = partner[s];
-        real dx = x[j].x - a.x, dy = x[j].y - a.y, dz = x[j].z - a.z;
-        const real length2 = squared_length(dx, dy, dz), k = stiffness(s);
-        const real q = stiffness_times_rest(s, si, co);
-        if (LEDGER && ACTUATED)
-            power += breathing_power(length2, k, q,
-                                     breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega));
-        const real pull = spring_pull(length2, k, q);
-        real px = pull * dx, py = pull * dy, pz = pull * dz;
-        f.x += px; f.y += py; f.z += pz;
-        F[j].x -= px; F[j].y -= py; F[j].z -= pz;
+        const Vec pull = spring_force(a, x[j], s, si, co);
+        f = f + pull;
+        F[j] = F[j] - pull;
     }
     return f;
 };
@@ -265,7 +272,7 @@ if (LEDGER) {
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = seen_x[partner[s]];
             springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z),
-                                     stiffness(s), stiffness_times_rest(s, sine, cosine));
+                                     stiffness(s), half_rest_force(s, sine, cosine));
         }
     }
     energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;

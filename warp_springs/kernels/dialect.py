@@ -46,12 +46,12 @@ _TYPES = {
     "float64": ("double", "long long", 8, "1e-200", "rsqrt14pd", 8, "unsigned char"),
 }
 
-# The estimate y of 1 / sqrt(a) errs by less than 2^-14. With h = 1 - a y^2 the series of
-# (1 - h)^(-1/2), to h for float32 and to h^3 for float64, leaves the last bit. Processors without
-# the estimate take square root and division.
+# The estimate y of 1 / sqrt(a) errs by less than 2^-14. With e = 1 - a y^2 the series of
+# (1 - e)^(-1/2), to e for float32 and to e^3 for float64, leaves the last bit or two; 2 + e is
+# 3 - a y^2. Processors without the estimate take square root and division.
 _SERIES = {
-    "float32": "y + y * (h * scalar(0.5))",
-    "float64": "y + y * (h * (scalar(0.5) + h * (scalar(0.375) + h * scalar(0.3125))))",
+    "float32": "(h * y) * (scalar(3) - (a * y) * y)",
+    "float64": "(h * y) * (scalar(2) + e * (scalar(1) + e * (scalar(0.75) + e * scalar(0.625))))",
 }
 
 
@@ -70,7 +70,7 @@ def vector_dialect(precision: str, width: int) -> str:
     auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
     auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
     auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
-    auto inverse_root = [](real a) __attribute__((always_inline)) -> real {{
+    auto over_root = [](real h, real a) __attribute__((always_inline)) -> real {{
     #if defined(__AVX512F__) && defined(__AVX512VL__)
         typedef scalar part __attribute__((vector_size(16)));
         typedef scalar whole __attribute__((vector_size({size * whole})));
@@ -87,10 +87,10 @@ def vector_dialect(precision: str, width: int) -> str:
                 y[l] = __builtin_ia32_{estimate}128_mask(one, one, (unsigned char)-1)[0];
             }}
         }}
-        const real h = scalar(1) - (a * y) * y;
+        const real e = scalar(1) - (a * y) * y;
         return {_SERIES[precision]};
     #else
-        return scalar(1) / __builtin_elementwise_sqrt(a);
+        return (h + h) / __builtin_elementwise_sqrt(a);
     #endif
     }};
     """

@@ -6,7 +6,8 @@ before the next one starts: its state stays in the first-level cache.
 
 Springs are sorted into rows by their lower mass. Row i gathers the force on mass i in registers and
 subtracts it from the partners, which all come later; so when row i ends mass i has its whole force,
-no later row reads its position, and it is moved at once.
+no later row reads its position, and it is moved at once. Two rows go together, since neighbours
+share partners.
 
 Every bundle is described by one row of the table ``BUNDLE``: where its blocks start in the flat
 buffers, how large they are. So one launch runs bundles of any topologies, and a robot's arithmetic
@@ -50,6 +51,54 @@ class Kernels(NamedTuple):
 
 
 _PASSES = r"""
+// The forces on masses i and i + 1 in one sweep: a partner of both is read and written once. The
+// sums are those of two rows, one after the other, to the bit.
+auto pair_force = [&](const Vec* x, int i, const int*& pair, real si, real co, Vec& fa, Vec& fb)
+        __attribute__((always_inline)) {
+    const Vec a = x[i], b = x[i + 1];
+    fa = F[i]; fb = F[i + 1];
+    F[i] = F[i + 1] = Vec{zero, zero, zero};
+    int s = row[i], t = row[i + 1];
+    const int end = t;
+    for (; s < end && partner[s] == i + 1; ++s) {
+        const Vec pull = spring_force(a, b, s, si, co);
+        fa = fa + pull; fb = fb - pull;
+    }
+    for (int runs = *pair++; runs > 0; --runs, pair += 3) {
+        for (int n = pair[0]; n > 0; --n, ++s) {
+            const int j = partner[s];
+            const Vec pull = spring_force(a, x[j], s, si, co);
+            fa = fa + pull; F[j] = F[j] - pull;
+        }
+        for (int n = pair[1]; n > 0; --n, ++s, ++t) {
+            const int j = partner[s];
+            const Vec c = x[j];
+            const Vec pull = spring_force(a, c, s, si, co), other = spring_force(b, c, t, si, co);
+            fa = fa + pull; fb = fb + other;
+            F[j] = (F[j] - pull) - other;
+        }
+        for (int n = pair[2]; n > 0; --n, ++t) {
+            const int j = partner[t];
+            const Vec pull = spring_force(b, x[j], t, si, co);
+            fb = fb + pull; F[j] = F[j] - pull;
+        }
+    }
+};
+// Forces where the masses are at `where`, and what is to be done with each: move(i, force). The
+// ledger adds up row by row, so that it is the same in a bundle of any width.
+auto sweep = [&](const Vec* where, auto move) __attribute__((always_inline)) {
+    const real si = sine, co = cosine;
+    const int* pair = pairs;
+    int i = 0;
+    for (; W > 1 && !LEDGER && i + 1 < M; i += 2) {
+        Vec fa, fb;
+        pair_force(where, i, pair, si, co, fa, fb);
+        move(i, fa);
+        move(i + 1, fb);
+    }
+    for (; i < M; ++i) move(i, row_force(where, i, si, co));
+};
+
 // Work of the breathing springs: their power at the instant of a kick, for the kick's time.
 auto enter_work = [&](scalar time) __attribute__((always_inline)) {
     if (ACTUATED) { ledger[0] += power * time; power = zero; }
@@ -58,31 +107,25 @@ auto enter_work = [&](scalar time) __attribute__((always_inline)) {
 // One kick by the springs, as they pull at x or where the gradient kick looks, and its drift.
 auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
-    const real si = sine, co = cosine;
-    const Vec* const where = shifted ? shifted_x : x;
-    for (int i = 0; i < M; ++i) {
-        const Vec f = row_force(where, i, si, co);
+    sweep(shifted ? shifted_x : x, [&](int i, Vec f) __attribute__((always_inline)) {
         Vec a = x[i], u = v[i];
         real rest = CHIN4 && last ? left_over[i] : zero;
         move_mass(a, u, f, w[i], substeps, rest, time, start, last, ledger);
         if (CHIN4 && !last) left_over[i] = rest;
         x[i] = a; v[i] = u;
-    }
+    });
 };
 auto gradient_shift = [&]() __attribute__((always_inline)) {
-    const real si = sine, co = cosine;
-    for (int i = 0; i < M; ++i) {
-        shifted_x[i] = shifted_position(x[i], row_force(x, i, si, co), w[i]);
-    }
+    sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
+        shifted_x[i] = shifted_position(x[i], f, w[i]);
+    });
 };
 auto euler = [&]() __attribute__((always_inline)) {
-    const real si = sine, co = cosine;
-    for (int i = 0; i < M; ++i) {
-        const Vec f = row_force(x, i, si, co);
+    sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         Vec a = x[i], u = v[i];
         move_mass_euler(a, u, f, w[i], ledger);
         x[i] = a; v[i] = u;
-    }
+    });
 };
 
 auto prepare = [&]() { for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero}; };

@@ -9,7 +9,7 @@ A layout puts in front of ``LAW`` a dialect that defines
 ``select(m, a, b)``       ``m ? a : b``, lane by lane
 ``any(m)``                true if any lane of ``m`` is
 ``square_root(a)``        IEEE square root
-``inverse_root(a)``       1 / sqrt(a) to the last bit or two, for a >= TINY
+``over_root(h, a)``       2 h / sqrt(a) to the last bit or two, for a >= TINY
 ========================  ======================================================================
 
 and the constants of ``CONSTANTS`` as ``const scalar``, the compile-time ``const bool`` of the
@@ -75,34 +75,34 @@ struct Vec {
 // What damping, drag and friction took from a velocity between two drifts.
 struct Losses { Vec damping, drag, friction; };
 
-// A spring of stiffness k and rest length L0 = q / k pulls its first mass with
-// k (L - L0) d / L = (k - q / L) d. TINY keeps 1 / L finite where two masses coincide;
+// A spring of stiffness k and rest length L0 pulls its first mass with k (L - L0) d / L
+// = (k - 2 h / L) d, where h = k L0 / 2. TINY keeps 1 / L finite where two masses coincide;
 // d = 0 then makes the force zero.
 auto squared_length = [=](real x, real y, real z) __attribute__((always_inline)) -> real {
     return x * x + (y * y + (z * z + TINY));
 };
-auto spring_pull = [=](real length2, real k, real q) __attribute__((always_inline)) -> real {
-    return k - q * inverse_root(length2);
+auto spring_pull = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
+    return k - over_root(h, length2);
 };
-auto spring_energy = [=](real length2, real k, real q) __attribute__((always_inline)) -> real {
-    real stretch_force = k * square_root(length2) - q;
+auto spring_energy = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
+    real stretch_force = k * square_root(length2) - h * scalar(2);
     return stretch_force * stretch_force / k * scalar(0.5);
 };
 
-// Power that a breathing spring puts in: -(tension) L0'(t), with L0' = q' / k.
-auto breathing_power = [=](real length2, real k, real q, real q_rate)
+// Power that a breathing spring puts in: -(tension) L0'(t), with L0' = 2 h' / k.
+auto breathing_power = [=](real length2, real k, real h, real h_rate)
         __attribute__((always_inline)) -> real {
-    return (q - k * square_root(length2)) * q_rate / k;
+    return (h * scalar(2) - k * square_root(length2)) * (h_rate * scalar(2)) / k;
 };
 
-// q(t) = k (a + b sin(wt + c)) = qa + qs sin(wt) + qc cos(wt)
-auto breathing = [=](real qa, real qs, real qc, real sine, real cosine)
+// h(t) = k / 2 (a + b sin(wt + c)) = ha + hs sin(wt) + hc cos(wt)
+auto breathing = [=](real ha, real hs, real hc, real sine, real cosine)
         __attribute__((always_inline)) -> real {
-    return qa + (qs * sine + qc * cosine);
+    return (ha + hs * sine) + hc * cosine;
 };
-auto breathing_rate = [=](real qs, real qc, real sine, real cosine, real omega)
+auto breathing_rate = [=](real hs, real hc, real sine, real cosine, real omega)
         __attribute__((always_inline)) -> real {
-    return (qs * cosine - qc * sine) * omega;
+    return (hs * cosine - hc * sine) * omega;
 };
 
 // Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
@@ -123,6 +123,7 @@ auto ground_force = [=](real z) __attribute__((always_inline)) -> real {
 // velocity up to mu_s hold, and an impulse j shortens a larger one by mu_k j along its direction.
 auto coulomb = [=](real& ux, real& uy, real hold, real j, scalar kinetic)
         __attribute__((always_inline)) {
+    if (!any(hold > zero)) return;
     real speed = square_root(ux * ux + uy * uy);
     real left = scalar(1) - kinetic * j / select(speed > zero, speed, zero + scalar(1));
     left = select(left > zero, left, zero);
@@ -134,8 +135,9 @@ auto coulomb = [=](real& ux, real& uy, real hold, real j, scalar kinetic)
 // force and the velocity vanish, above it the force is reduced by mu_k n.
 auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n)
         __attribute__((always_inline)) {
-    real f = square_root(fx * fx + fy * fy);
     mask touching = n > zero;
+    if (!any(touching)) return;
+    real f = square_root(fx * fx + fy * fy);
     mask stuck = touching & (f < static_friction * n);
     real left = scalar(1) - kinetic_friction * n / select(f > zero, f, zero + scalar(1));
     left = select(left > zero, left, zero);

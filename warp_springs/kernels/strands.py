@@ -139,10 +139,10 @@ const real si = zero + sine[0], co = zero + cosine[0];
 for (int s = 0; s < SP; s += W) {
     real* const d = (real*)(D + s);
     const real* const k = P + s / W * coefficients;
-    const real q = ACTUATED ? breathing(k[1], k[2], k[3], si, co) : k[1];
+    const real h = ACTUATED ? breathing(k[1], k[2], k[3], si, co) : k[1];
     real dx = d[0], dy = d[1], dz = d[2], pad = d[3];
     transpose(dx, dy, dz, pad);
-    const real pull = spring_pull(squared_length(dx, dy, dz), k[0], q);
+    const real pull = spring_pull(squared_length(dx, dy, dz), k[0], h);
     d[0] *= spread0(pull); d[1] *= spread1(pull); d[2] *= spread2(pull); d[3] *= spread3(pull);
 }
 for (int g = 0; g < G; ++g) {
