@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 import json
 import re
@@ -210,6 +211,25 @@ def test_materials_and_classes_of_stiffness_have_colours(result, cube):
     assert header["materials"][bone]["color"] == pytest.approx(ws.materials.BONE.rgb)
     labels = Arrays(data)(header["robots"][2]["material"])
     np.testing.assert_array_equal(labels == bone, result.robots[2].material == 0)
+
+
+def test_obstacles_and_pushes_are_drawn(browser, result, cube, tmp_path):
+    pushed = cube.pushed([0], (3.0, 0.0, 0.0), duration=0.2)
+    ball = ws.Sphere(center=(0.25, -0.1, 0.0), radius=0.1)
+    floor = dataclasses.replace(result.scene, obstacles=(ball, ws.Plane((0, 1, 1), -0.3)))
+    changed_result = dataclasses.replace(result, scene=floor, robots=[pushed])
+    path = ws.export_html(changed_result, tmp_path / "page.html", robots=[0])
+    page = browser.open(path.as_uri(), size=(800, 500))
+    page.wait("document.body.dataset.state === 'ready'")
+    red, green, blue = (still(page)[:420, :500, k].astype(int) for k in range(3))
+    brown = (red - blue > 15) & (red - blue < 60) & (red > 120)
+    orange = (red - blue > 110) & (green - blue > 30)
+    assert brown.mean() > 0.03 and orange.sum() > 30
+    page.key("End")
+    assert page.evaluate("document.getElementById('clock').textContent") == "0.50 s"
+    red, green, blue = (settled(page)[:420, :500, k].astype(int) for k in range(3))
+    assert not ((red - blue > 110) & (green - blue > 30)).any(), "the push is over"
+    assert page.complaints == []
 
 
 def test_nothing_in_a_text_escapes_into_the_page(result):

@@ -20,6 +20,8 @@ SHORTER = (0.01, 0.30, 0.26)
 """Colour of a bar told to be as short as any is, or shorter."""
 PUSH = (0.86, 0.36, 0.01)
 """Colour of the arrows that stand for external forces."""
+OBSTACLE = (0.52, 0.44, 0.36)
+"""Colour of obstacles."""
 MASS = (0.012, 0.013, 0.016)
 """Colour of the spheres that stand for masses."""
 SKIN = (0.26, 0.47, 0.66)

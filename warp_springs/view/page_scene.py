@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from warp_springs.checks import check_number
 from warp_springs.io.usd_layout import Track, chosen_robots, placed, track
 from warp_springs.stability import Status
+from warp_springs.surfaces import Sphere
 from warp_springs.view import appearance
 from warp_springs.view.palette import material_palette
+from warp_springs.view.solids import obstacle_mesh
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
@@ -24,6 +26,10 @@ STEPS_PER_BAR = 64
 """Steps of the grid that positions are rounded to, in a bar's radius."""
 LEVELS = 63
 """Shades of a colour on either side of neutral."""
+_NO_ACTUATION = 1e-9
+"""Share of a rest length below which a change is only rounding."""
+_ARROW = 0.5
+"""Length of the arrow of the largest push in diameters of its robot."""
 ENERGIES = ("kinetic", "gravity", "spring", "ground", "residual")
 """The energies that the page plots."""
 
@@ -82,6 +88,7 @@ def described(
         ),
         "levels": LEVELS,
         "colors": _colors(),
+        "solids": _solids(result, tracks, offsets, block),
         "materials": [{"name": name, "color": list(color)} for name, color in palette],
         "robots": [
             {
@@ -91,6 +98,7 @@ def described(
                 **_body(item, block),
                 **_motion(result, item, offset, block),
                 **_plots(result, item, block),
+                "pushes": _pushes(item),
             }
             for item, offset, label in zip(tracks, offsets, labels, strict=True)
         ],
@@ -144,12 +152,12 @@ def _motion(result: Result, item: Track, offset: NDArray, block: Block) -> dict[
 
 def _actuation(robot: Robot, times: NDArray, block: Block) -> dict[str, Any]:
     """By how much springs are told to be longer or shorter, as a share of their rest length."""
-    if not robot.is_actuated:
-        return {"actuation": None, "actuationScale": 0.0}
     rest = robot.rest_length
     share = np.divide(robot.rest_length_at(times) - rest, rest, where=rest > 0.0,
                       out=np.zeros((len(times), len(rest))))  # fmt: skip
-    scale = max(float(np.abs(share).max()), 1e-9)
+    scale = float(np.abs(share).max(initial=0.0))
+    if scale < _NO_ACTUATION:
+        return {"actuation": None, "actuationScale": 0.0}
     # Spring by spring: what a spring does in time is smooth, and so compresses best.
     changes = _changes(_levels(share / scale), np.int8).T
     return {"actuation": block.add(changes, "i1"), "actuationScale": scale}
@@ -163,6 +171,34 @@ def _plots(result: Result, item: Track, block: Block) -> dict[str, Any]:
         f"energy_{name}": block.add(getattr(result.energy, name)[item.index], "f4")
         for name in ENERGIES
     }
+
+
+def _pushes(item: Track) -> list[dict[str, Any]]:
+    """The external forces on a robot; the largest is an arrow half as long as the robot."""
+    pushes = [push for push in item.robot.elements.pushes if any(push.force)]
+    largest = max((np.linalg.norm(push.force) for push in pushes), default=1.0)
+    return [
+        {
+            "masses": list(push.masses),
+            "start": push.start,
+            "end": min(push.end, 1e9),  # JSON has no infinity
+            "arrow": (_ARROW * item.robot.diameter / largest * np.array(push.force)).tolist(),
+        }
+        for push in pushes
+    ]
+
+
+def _solids(result: Result, tracks: list[Track], offsets: NDArray, block: Block) -> list[dict]:
+    """The obstacles, around every robot: each has a world of its own."""
+    boxes = np.stack([item.box for item in tracks])
+    box = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    solids = []
+    for obstacle in result.scene.obstacles:
+        points, triangles = obstacle_mesh(obstacle, box)
+        center = list(obstacle.center) if isinstance(obstacle, Sphere) else None
+        mesh = block.add(points[triangles], "f4")
+        solids.append({"mesh": mesh, "at": offsets.tolist(), "center": center})
+    return solids
 
 
 def _facts(result: Result, item: Track, notes: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -204,6 +240,7 @@ def _colors() -> dict[str, Any]:
         "sky": appearance.SKY,
         "zenith": appearance.ZENITH,
         "push": appearance.PUSH,
+        "obstacle": appearance.OBSTACLE,
     }
     return {name: list(color) for name, color in names.items()}
 

@@ -10,6 +10,7 @@ async function readScene() {
   const block = await new Response(stream).arrayBuffer();
   const scene = JSON.parse(document.getElementById("header").textContent);
   const frames = scene.times.length;
+  for (const solid of scene.solids) solid.mesh = readArray(block, solid.mesh);
   for (const robot of scene.robots) {
     for (const [name, value] of Object.entries(robot)) {
       if (value && value.type) robot[name] = readArray(block, value);

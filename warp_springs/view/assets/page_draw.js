@@ -20,9 +20,8 @@ class Painter {
     this.positions = this.texture(scene.robots.map((r) => r.motion), 3, gl.RGB16I, gl.RGB_INTEGER, gl.SHORT);
     this.values = { stress: this.colorTexture("stress"), actuation: this.colorTexture("actuation") };
     this.makeBodies();
-    this.solids = (scene.solids || []).map((solid) => this.makeSolid(solid.mesh, solid.color, solid.at));
-    this.arrowMesh = arrowMesh();
-    this.arrow = this.makeSolid(this.arrowMesh, scene.colors.push);
+    this.solids = scene.solids.map((solid) => this.makeSolid(solid.mesh, scene.colors.obstacle, solid));
+    this.arrow = this.makeSolid(arrowMesh(), scene.colors.push);
   }
 
   program(vertex, fragment) {
@@ -132,15 +131,15 @@ class Painter {
     });
   }
 
-  // `mesh`: nine numbers a triangle. `at`: places where it stands, the origin by default.
-  makeSolid(mesh, color, at = [[0, 0, 0]]) {
+  // `mesh`: nine numbers a triangle. `at`: the places where it stands. `center`: of a round one.
+  makeSolid(mesh, color, { at = [[0, 0, 0]], center = null } = {}) {
     const { gl } = this;
-    const normals = flatNormals(mesh);
+    const normals = center ? Float32Array.from(mesh, (v, i) => v - center[i % 3]) : flatNormals(mesh);
     const array = this.vertexArray(() => {
       this.attribute(0, this.buffer(new Float32Array(mesh)), 3, gl.FLOAT);
       this.attribute(1, this.buffer(normals), 3, gl.FLOAT);
     });
-    return { array, count: mesh.length / 3, color, at };
+    return { array, count: mesh.length / 3, color, at, ...boundsOf(mesh, at) };
   }
 
   vertexArray(fill) {

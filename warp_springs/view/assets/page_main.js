@@ -47,8 +47,13 @@ class Show {
     return [0, 1, 2].map((k) => middles[3 * a + k] + blend * (middles[3 * b + k] - middles[3 * a + k]));
   }
 
+  // What throws shadows: the robots, and the obstacles about them.
   shownBox(moment) {
-    return boxAround(this.scene.robots.map((_, i) => this.boxAt(moment, i)));
+    const robots = boxAround(this.scene.robots.map((_, i) => this.boxAt(moment, i)));
+    const room = Math.hypot(...sub(robots.high, robots.low));
+    const near = [0, 1, 2].map((k) => [robots.low[k] - room, robots.high[k] + room]);
+    const clipped = (p) => p.map((v, k) => clamp(v, ...near[k]));
+    return boxAround([robots, ...this.painter.solids.map(({ low, high }) => ({ low: clipped(low), high: clipped(high) }))]);
   }
 
   // -- what a person does -------------------------------------------------------------------------
@@ -254,22 +259,25 @@ class Show {
     this.placeLabels(moment);
   }
 
-  // The pushes that act now, as arrows that end at the masses they push.
+  // The pushes that act now.
   arrows(moment) {
     const t = this.scene.times[0] + this.time;
     const found = [];
-    for (const robot of this.scene.robots) {
-      for (const push of robot.pushes || []) {
+    this.scene.robots.forEach((robot, r) => {
+      const middle = this.middleAt(moment, r);
+      for (const push of robot.pushes) {
         if (t < push.start || t > push.end) continue;
         for (const i of push.masses) {
           const at = [0, 1, 2].map((k) => {
             const p = (frame) => robot.motion[(frame * robot.masses + i) * 3 + k];
             return robot.center[k] + robot.quantum * (p(moment.a) + moment.blend * (p(moment.b) - p(moment.a)));
           });
-          found.push(arrowMatrix(sub(at, push.arrow), push.arrow));
+          // It lies outside the body, where it is seen: it starts at the mass, or it ends there.
+          const outwards = dot(push.arrow, sub(at, middle)) >= 0;
+          found.push(arrowMatrix(outwards ? at : sub(at, push.arrow), push.arrow));
         }
       }
-    }
+    });
     return found;
   }
 

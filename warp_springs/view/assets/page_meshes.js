@@ -56,3 +56,10 @@ function flatNormals(mesh) {
   }
   return normals;
 }
+
+// The box around a mesh at all its places.
+function boundsOf(mesh, at) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  mesh.forEach((v, i) => { low[i % 3] = Math.min(low[i % 3], v); high[i % 3] = Math.max(high[i % 3], v); });
+  return boxAround(at.map((place) => ({ low: add(low, place), high: add(high, place) })));
+}
