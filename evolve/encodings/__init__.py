@@ -6,17 +6,46 @@ configuration.
 
 from __future__ import annotations
 
+from evolve.encodings.actuation import ActuationSettings, FixedBody
 from evolve.encodings.base import ArrayGenomes, Encoding, EncodingSettings
+from evolve.encodings.cppn import CppnEncoding, CppnSettings
 from evolve.encodings.direct import DirectEncoding, DirectSettings
+from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
+from evolve.encodings.fourier import FourierEncoding, FourierSettings
+from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
+from evolve.encodings.neural import NeuralEncoding, NeuralSettings
+from evolve.encodings.regions import RegionsEncoding, RegionsSettings
 
 __all__ = [
     "ENCODINGS",
+    "ActuationSettings",
     "ArrayGenomes",
+    "CppnEncoding",
+    "CppnSettings",
     "DirectEncoding",
     "DirectSettings",
     "Encoding",
     "EncodingSettings",
+    "ExpressionEncoding",
+    "ExpressionSettings",
+    "FixedBody",
+    "FourierEncoding",
+    "FourierSettings",
+    "HarmonicsEncoding",
+    "HarmonicsSettings",
+    "NeuralEncoding",
+    "NeuralSettings",
+    "RegionsEncoding",
+    "RegionsSettings",
 ]
 
-ENCODINGS: dict[str, type[Encoding]] = {"direct": DirectEncoding}
+ENCODINGS: dict[str, type[Encoding]] = {
+    "direct": DirectEncoding,
+    "regions": RegionsEncoding,
+    "harmonics": HarmonicsEncoding,
+    "fourier": FourierEncoding,
+    "expression": ExpressionEncoding,
+    "neural": NeuralEncoding,
+    "cppn": CppnEncoding,
+}
 """Name in the configuration -> class."""
