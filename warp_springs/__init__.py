@@ -28,6 +28,7 @@ __all__ = [
     "Box",
     "Circle",
     "Collisions",
+    "Document",
     "Elements",
     "Energy",
     "Ground",
@@ -68,6 +69,7 @@ except PackageNotFoundError:  # a source tree that was never installed
 
 # Names whose modules need pxr, matplotlib or Pillow: loaded on first use.
 _LAZY = {
+    "Document": ("warp_springs.view.document", "Document"),
     "export_html": ("warp_springs.view.page", "export_html"),
     "export_usd": ("warp_springs.io.usd", "export_usd"),
     "html_page": ("warp_springs.view.page", "html_page"),

@@ -24,7 +24,8 @@ COLORS = ("stress", "material", "actuation")
 SCRIPTS = ("data", "camera", "meshes", "shaders", "draw", "plot", "main")
 """The parts of the page's script, in the order in which they build on each other."""
 
-_SUFFIXES = (".html", ".htm")
+SUFFIXES = (".html", ".htm")
+"""What the name of a page may end in."""
 
 
 def export_html(result: Result, path: str | os.PathLike[str], **options: Any) -> Path:
@@ -48,7 +49,7 @@ def export_html(result: Result, path: str | os.PathLike[str], **options: Any) ->
         ValueError: As in `html_page`, or the suffix is not ``.html``.
         OSError: The file cannot be written.
     """
-    path = checked_output(path, _SUFFIXES)
+    path = checked_output(path, SUFFIXES)
     text = html_page(result, **options)
     with written_beside(path) as draft:
         draft.write_text(text, encoding="utf-8")
@@ -91,16 +92,17 @@ def html_page(
     check_choice("color", color, COLORS)
     header, data = described(result, robots, names or {}, custom_data or {}, grid, spacing)
     header["look"] = {"color": color, "skin": bool(skin)}
-    return Template(_asset("page.html")).substitute(
+    return Template(asset("page.html")).substitute(
         title=html.escape(title),
-        style=_asset("page.css"),
-        script="\n".join(_asset(f"page_{name}.js") for name in SCRIPTS),
+        style=asset("page.css"),
+        script="\n".join(asset(f"page_{name}.js") for name in SCRIPTS),
         header=_as_script(header),
         data=data,
     )
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """The text of a file of the folder ``assets``."""
     return files("warp_springs.view").joinpath("assets", name).read_text(encoding="utf-8")
 
 
