@@ -140,7 +140,7 @@ def test_what_is_animated_also_has_a_rest_value_and_a_unique_name(stage):
         for attribute in prim.GetAttributes()
         if attribute.GetNumTimeSamples()
     ]
-    assert len(animated) == 2 * 5  # translation, turn, joints, extent, colours of two robots
+    assert len(animated) == 2 * 5 + 1  # translation, turn, joints, extent, colours; a camera
     assert all(a.Get(Usd.TimeCode.Default()) is not None for a in animated)
     prims = {a.GetPrim().GetPath() for a in animated}
     assert len({path.name for path in prims}) == len(prims)
@@ -250,9 +250,9 @@ def test_colours_follow_the_stress(tmp_path):
     mesh = stage.GetPrimAtPath(robot.GetPath().AppendPath("robot_0000_body/robot_0000_bars"))
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayColor")
     assert primvar.GetInterpolation() == "uniform"
-    faces = np.array(primvar.ComputeFlattened(0)).reshape(3, usd_geometry.TUBE_SIDES, 3)
-    assert (np.ptp(faces, axis=1) == 0).all()
-    stretched, compressed, resting = faces[:, 0]
+    faces = np.array(primvar.ComputeFlattened(0)).reshape(usd_geometry.TUBE_SIDES, 3, 3)
+    assert (np.ptp(faces, axis=0) == 0).all()
+    stretched, compressed, resting = faces[0]
     np.testing.assert_allclose(stretched, appearance.TENSION, rtol=1e-5)
     np.testing.assert_allclose(compressed, appearance.COMPRESSION, rtol=1e-5)
     np.testing.assert_allclose(resting, appearance.NEUTRAL, rtol=1e-5)
@@ -269,8 +269,8 @@ def test_colours_in_every_frame_are_those_of_the_tensions(stage, exported):
     expected = appearance.stress_index(tension, scale)
     assert 0 < np.mean(expected > appearance.STRESS_STEPS) < 1
     for frame, colors in enumerate(expected):
-        shown = np.array(indices.Get(frame)).reshape(-1, usd_geometry.TUBE_SIDES)
-        assert (shown == colors[:, None]).all()
+        shown = np.array(indices.Get(frame)).reshape(usd_geometry.TUBE_SIDES, -1)
+        assert (shown == colors).all()
 
 
 # -- which robots, where, under which names ----------------------------------------------------
@@ -334,9 +334,9 @@ def test_chosen_robots_names_and_custom_data(result, tmp_path):
 
 
 def test_names_are_unique_and_never_those_of_the_scenery():
-    names = {0: "best", 1: "Best", 2: "best", 3: "Ground", 4: ""}
-    unique = usd_layout.unique_names(range(6), names, ["World", "Ground"])
-    assert unique == ["best", "Best_2", "best_3", "Ground_2", "robot_", "robot_0005"]
+    names = ["best", "Best", "best", "Ground", ""]
+    unique = usd_layout.unique_names(names, ["World", "Ground"])
+    assert unique == ["best", "Best_2", "best_3", "Ground_2", "robot_"]
 
 
 # -- bodies and runs that went wrong -----------------------------------------------------------
@@ -417,7 +417,7 @@ def test_an_export_that_fails_leaves_the_old_file_alone(result, tmp_path, monkey
     def fail(self, *arguments):
         raise RuntimeError("disk on fire")
 
-    monkeypatch.setattr("warp_springs.io.usd_skel.SkelRobot.write", fail)
+    monkeypatch.setattr("warp_springs.io.usd_skel.SkelBody.write", fail)
     with pytest.raises(RuntimeError, match="on fire"):
         ws.export_usd(result, path)
     assert path.read_bytes() == before
@@ -458,7 +458,7 @@ def test_a_failure_of_usd_is_an_os_error(result, tmp_path, monkeypatch):
         ({"custom_data": {0: {"a": {"b": object()}}}}, r"custom_data\[0\]\['a'\]\['b'\]"),
         ({"custom_data": {0: {"seed": 2**63}}}, "63 bits"),
         ({"custom_data": {0: {3: 1}}}, "key 3"),
-        ({"spacing": -1.0}, "positive length"),
+        ({"spacing": -1.0}, "spacing: got -1.0"),
         ({"spacing": 1.0, "grid": False}, "grid=False"),
     ],
 )
@@ -505,11 +505,14 @@ def test_meshes_face_outward(cube):
     balls = usd_geometry.balls(middle, 0.02)
     for part in (tubes, balls):
         np.testing.assert_allclose(np.linalg.norm(part.normals, axis=1), 1.0)
-        along = np.einsum("fi,fci->fc", face_normals(part), part.normals[part.faces])
+        along = np.einsum("fi,fci->fc", face_normals(part), part.normals[part.corner_normals])
         assert (along > 0).all()
+    at = balls.normals[balls.corner_normals]
     np.testing.assert_allclose(
-        balls.points, middle[balls.masses] + 0.02 * balls.normals, atol=1e-15
+        balls.points[balls.faces], middle[balls.masses][balls.faces] + 0.02 * at, atol=1e-15
     )
+    at = tubes.points[tubes.faces] - 0.01 * tubes.normals[tubes.corner_normals]
+    np.testing.assert_allclose(at, middle[tubes.masses][tubes.faces], atol=1e-15)
     skin = usd_geometry.skin(middle, cube.faces)
     outward = skin.points[skin.faces].mean(axis=1)
     assert (np.sum(face_normals(skin) * outward, axis=1) > 0).all()
@@ -519,7 +522,16 @@ def test_a_ball_is_closed():
     ball = usd_geometry.balls(np.zeros((1, 3)), 1.0)
     edges = np.concatenate([ball.faces[:, [0, 1]], ball.faces[:, [1, 2]], ball.faces[:, [2, 0]]])
     there = {tuple(edge) for edge in edges.tolist()}
-    assert len(there) == 3 * 80 and all((b, a) in there for a, b in there)
+    assert len(there) == 3 * 48 and all((b, a) in there for a, b in there)
+
+
+def test_tubes_are_cut_almost_straight():
+    vectors = np.random.default_rng(3).normal(size=(5000, 3))
+    axes = usd_geometry.axes()[usd_geometry.nearest_axes(vectors)]
+    cosines = np.abs(np.sum(axes * vectors, axis=1)) / np.linalg.norm(vectors, axis=1)
+    assert np.degrees(np.arccos(cosines.min())) < 7.0
+    rings = usd_geometry.ring_normals().reshape(-1, usd_geometry.TUBE_SIDES, 3)
+    assert np.abs(np.einsum("aki,ai->ak", rings, usd_geometry.axes())).max() < 1e-12
 
 
 def test_rigid_fit_recovers_a_motion(cube):

@@ -4,10 +4,12 @@ The file is an uncompressed zip of NumPy arrays, readable with ``numpy.load``:
 
 ``header``
     One JSON text, ASCII. ``format`` is ``"warp_springs result"``, ``version`` that of this layout,
-    ``warp_springs`` the version that wrote it, ``result`` the public fields of `Result`. In it an
-    object is ``{"type": name, "fields": ...}``, a tuple ``{"tuple": [...]}``, a dict
-    ``{"dict": [[key, value], ...]}``, an array ``{"array": [dtype, first, shape]}``: so many
-    values, from ``first`` on, of the pool of its type.
+    ``warp_springs`` the version that wrote it, ``masses`` how many each robot has, ``result`` the
+    public fields of `Result`, ``objects`` the robots and data classes in them, each once and before
+    whatever holds it: ``{"type": name, "fields": {...}}``, or ``"arguments"`` for robots. A tuple
+    is ``{"tuple": [...]}``, a dict ``{"dict": [[key, value], ...]}``, an object
+    ``{"object": index}``, an array ``{"array": [dtype, first, shape]}``: so many values, from
+    ``first`` on, of the pool of its type.
 ``pool/DTYPE``
     All arrays of one type (``float64``, ``int32``, ...), raveled, one after the other.
 ``positions``, ``velocities``
@@ -33,7 +35,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from warp_springs.io.outputs import checked_output, written_beside
-from warp_springs.io.trees import Pools, decoded, encoded
+from warp_springs.io.trees import Reader, Writer
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
@@ -58,18 +60,19 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> Path:
     from warp_springs import __version__
 
     path = checked_output(path, _SUFFIXES)
-    pools = Pools()
+    writer = Writer()
     public = [f.name for f in dataclasses.fields(result) if not f.name.startswith("_")]
     header = {
         "format": FORMAT,
         "version": VERSION,
         "warp_springs": __version__,
         "masses": [len(result.positions(i)) for i in range(len(result))],
-        "result": {name: encoded(getattr(result, name), pools, name) for name in public},
+        "result": {name: writer.tree(getattr(result, name), name) for name in public},
+        "objects": writer.objects,
     }
     with written_beside(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_STORED) as file:
         _write(file, "header", np.array(json.dumps(header).encode()))
-        for dtype, pool in pools.joined().items():
+        for dtype, pool in writer.pools().items():
             _write(file, f"pool/{dtype}", pool)
         for name in ("positions", "velocities"):
             _write_states(file, name, getattr(result, name), header["masses"])
@@ -88,7 +91,8 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         header = json.loads(entries["header"].item())
         _check_header(header)
         pools = {name[5:]: array for name, array in entries.items() if name.startswith("pool/")}
-        fields = {name: decoded(tree, pools) for name, tree in header["result"].items()}
+        reader = Reader(pools, header["objects"])
+        fields = {name: reader.value(tree) for name, tree in header["result"].items()}
         masses = header["masses"]
         return Result(
             **fields,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -14,93 +14,123 @@ import numpy as np
 from warp_springs.robot import Robot
 from warp_springs.variants import Variants
 
-__all__ = ["Pools", "decoded", "encoded"]
+__all__ = ["Reader", "Writer"]
 
 _PACKAGE = __name__.partition(".")[0]
 
 
-class Pools:
-    """All arrays of a tree, those of one type in one pool; an array met again is kept once."""
+class Writer:
+    """Turns values into trees; arrays and objects that are met again are kept once.
+
+    Attributes:
+        objects: Trees of the robots and data classes met, each before whatever holds it.
+    """
 
     def __init__(self) -> None:
+        self.objects: list[Any] = []
         self._arrays: dict[str, list[np.ndarray]] = defaultdict(list)
         self._sizes: dict[str, int] = defaultdict(int)
-        self._places: dict[int, list[Any]] = {}
-        self._kept: list[np.ndarray] = []  # an id is its array's only while the array lives
+        self._places: dict[int, Any] = {}
+        self._kept: list[Any] = []  # an id is its owner's only while the owner lives
 
-    def place(self, array: np.ndarray) -> list[Any]:
-        """Keep an array; returns its type, its first value in the pool, and its shape."""
-        if id(array) not in self._places:
-            dtype = array.dtype.name
-            self._places[id(array)] = [dtype, self._sizes[dtype], list(array.shape)]
-            self._kept.append(array)
-            self._arrays[dtype].append(array.ravel())
-            self._sizes[dtype] += array.size
-        return self._places[id(array)]
-
-    def joined(self) -> dict[str, np.ndarray]:
-        """The pools, flat, by the names of their types."""
+    def pools(self) -> dict[str, np.ndarray]:
+        """All arrays of one type, flat, by the names of the types."""
         return {dtype: np.concatenate(parts) for dtype, parts in self._arrays.items()}
 
+    def tree(self, value: Any, where: str) -> Any:
+        """A value as what JSON can hold.
 
-def encoded(value: Any, pools: Pools, where: str) -> Any:
-    """A value as what JSON can hold; its arrays go to the pools.
+        Raises:
+            TypeError: There is something else in it than numbers, texts, arrays, sequences, dicts,
+                robots and data classes of this package; ``where`` says in which part.
+        """
+        if isinstance(value, np.generic):
+            value = value.item()
+        if value is None or isinstance(value, (bool, int, float, str)):
+            return value
+        if isinstance(value, tuple):
+            return {"tuple": [self.tree(v, f"{where}[{i}]") for i, v in enumerate(value)]}
+        if isinstance(value, list):
+            return [self.tree(v, f"{where}[{i}]") for i, v in enumerate(value)]
+        if isinstance(value, Mapping):
+            return {"dict": [[k, self.tree(v, f"{where}[{k!r}]")] for k, v in value.items()]}
+        if id(value) not in self._places:
+            place = self._array if isinstance(value, np.ndarray) else self._object
+            self._places[id(value)] = place(value, where)
+            self._kept.append(value)
+        return self._places[id(value)]
+
+    def _array(self, array: np.ndarray, where: str) -> Any:
+        if array.dtype.kind not in "biufU":
+            raise TypeError(f"{where}: an array of {array.dtype} cannot be kept in a file")
+        dtype = array.dtype.name
+        place = {"array": [dtype, self._sizes[dtype], list(array.shape)]}
+        self._arrays[dtype].append(array.ravel())
+        self._sizes[dtype] += array.size
+        return place
+
+    def _object(self, value: Any, where: str) -> Any:
+        if isinstance(value, (Robot, Variants)):  # they say themselves what they are made from
+            content = {"arguments": self.tree(value.__reduce__()[1], where)}
+        elif dataclasses.is_dataclass(value) and _known(type(value)):
+            fields = [f.name for f in dataclasses.fields(value) if f.init]
+            content = {"fields": {n: self.tree(getattr(value, n), f"{where}.{n}") for n in fields}}
+        else:
+            raise TypeError(f"{where}: a {type(value).__name__} cannot be kept in a file")
+        self.objects.append({"type": _name(type(value)), **content})
+        return {"object": len(self.objects) - 1}
+
+
+class Reader:
+    """Turns trees back into values.
+
+    Args:
+        pools: The arrays that a `Writer` kept.
+        objects: The trees of objects that it kept.
 
     Raises:
-        TypeError: There is something else in it than numbers, texts, arrays, sequences, dicts,
-            robots and data classes of this package; ``where`` says in which part.
+        ValueError: A tree names something that this package has not.
+        KeyError: The pool of an array is missing.
+        IndexError: An object is missing.
     """
-    if isinstance(value, np.generic):
-        value = value.item()
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    if isinstance(value, np.ndarray) and value.dtype.kind in "biufU":
-        return {"array": pools.place(value)}
-    if isinstance(value, tuple):
-        return {"tuple": [encoded(v, pools, f"{where}[{i}]") for i, v in enumerate(value)]}
-    if isinstance(value, list):
-        return [encoded(v, pools, f"{where}[{i}]") for i, v in enumerate(value)]
-    if isinstance(value, Mapping):
-        pairs = [[k, encoded(v, pools, f"{where}[{k!r}]")] for k, v in value.items()]
-        return {"dict": pairs}
-    if isinstance(value, (Robot, Variants)):  # they say themselves what they are made from
-        arguments = encoded(value.__reduce__()[1], pools, where)
-        return {"type": _name(type(value)), "arguments": arguments}
-    if dataclasses.is_dataclass(value) and _known(type(value)):
-        fields = {
-            f.name: encoded(getattr(value, f.name), pools, f"{where}.{f.name}")
-            for f in dataclasses.fields(value)
-            if f.init
-        }
-        return {"type": _name(type(value)), "fields": fields}
-    raise TypeError(f"{where}: a {type(value).__name__} cannot be kept in a file")
 
+    def __init__(self, pools: Mapping[str, np.ndarray], objects: Sequence[Any]) -> None:
+        self._pools = pools
+        self._objects: list[Any] = []
+        for tree in objects:
+            self._objects.append(self._made(tree))
 
-def decoded(tree: Any, pools: Mapping[str, np.ndarray]) -> Any:
-    """What was encoded; the arrays are read from the pools.
+    def value(self, tree: Any) -> Any:
+        """What a tree stands for."""
+        if isinstance(tree, list):
+            return [self.value(item) for item in tree]
+        if not isinstance(tree, dict):
+            return tree
+        (kind, content) = next(iter(tree.items()))
+        if kind == "array":
+            dtype, first, shape = content
+            count = math.prod(shape)
+            values = self._pools[dtype][first : first + count] if count else []
+            return np.array(values, dtype).reshape(shape)
+        if kind == "object":
+            return self._objects[content]
+        if kind == "tuple":
+            return tuple(self.value(item) for item in content)
+        return {key: self.value(item) for key, item in content}
 
-    Raises:
-        ValueError: The tree names something that this package has not.
-        KeyError: An array's pool is missing.
-    """
-    if isinstance(tree, list):
-        return [decoded(item, pools) for item in tree]
-    if not isinstance(tree, dict):
-        return tree
-    if "array" in tree:
-        dtype, first, shape = tree["array"]
-        values = pools[dtype][first : first + math.prod(shape)] if math.prod(shape) else []
-        return np.array(values, dtype).reshape(shape)
-    if "tuple" in tree:
-        return tuple(decoded(item, pools) for item in tree["tuple"])
-    if "dict" in tree:
-        return {key: decoded(item, pools) for key, item in tree["dict"]}
-    kind = _class(tree["type"])
-    if kind is Robot:
-        return Robot(**decoded(tree["arguments"], pools)[0])
-    if kind is Variants:
-        return Variants(*decoded(tree["arguments"], pools))
-    return kind(**{name: decoded(item, pools) for name, item in tree["fields"].items()})
+    def _made(self, tree: Mapping[str, Any]) -> Any:
+        made_of = _class(tree["type"])
+        if made_of is Robot:
+            return Robot(**self.value(tree["arguments"])[0])
+        if made_of is Variants:
+            return Variants(*self.value(tree["arguments"]))
+        fields = {name: self.value(item) for name, item in tree["fields"].items()}
+        made = made_of(**fields)
+        # It has been checked. What was normalised twice may have changed in its last bit.
+        for name, value in fields.items():
+            if not isinstance(value, np.ndarray):
+                object.__setattr__(made, name, value)
+        return made
 
 
 def _known(kind: type) -> bool:

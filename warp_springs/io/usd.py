@@ -2,41 +2,65 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
 import os
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from warp_springs import __version__
+from warp_springs.checks import check_choice, check_number
+from warp_springs.io.outputs import checked_output, written_beside
 from warp_springs.io.usd_layout import (
+    Paint,
     Track,
     chosen_robots,
     frame_rate,
+    paints,
     placed,
+    surface_only,
     track,
     unique_names,
 )
+from warp_springs.io.usd_notes import facts, provenance, usd_dict
 from warp_springs.view import appearance
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
 
+    from warp_springs.io.usd_body import Body
     from warp_springs.io.usd_stage import Looks
     from warp_springs.result import Result
+    from warp_springs.robot import Robot
 
 __all__ = ["export_usd"]
 
+Geometry = Literal["auto", "skel", "points", "mesh"]
+Color = Literal["stress", "material"]
+Springs = Literal["auto", "all", "surface"]
+
+MOST_JOINTS = 1000
+"""Masses of a robot beyond which it is drawn as points and curves, unless asked otherwise."""
 _SUFFIXES = (".usdc", ".usda", ".usdz")
 _BLOCK_BYTES = 16_000_000
 """Samples held in memory between two saves."""
 _SCALE_FRAMES = 64
-"""Frames, spread over the animation, that decide what tension takes the full colour."""
+_SCALE_SPRINGS = 1_000_000
+"""Frames, spread over the animation, that decide what tension takes the full colour: so many, or
+fewer where they would have more springs than that in all."""
+
+
+class _Drawn(NamedTuple):
+    """A robot to be written."""
+
+    item: Track
+    robot: Robot  # with the springs that are drawn
+    geometry: str
+    paint: Paint
+    offset: np.ndarray
+    name: str
+    notes: dict[str, Any]
 
 
 def export_usd(
@@ -48,61 +72,88 @@ def export_usd(
     custom_data: Mapping[int, Mapping[str, Any]] | None = None,
     grid: bool = True,
     spacing: float | None = None,
+    geometry: Geometry = "auto",
+    color: Color = "stress",
+    springs: Springs = "auto",
+    progress: Callable[[float], None] | None = None,
 ) -> Path:
     """Write recorded robots as an animated OpenUSD stage and return its path.
 
     The stage is z up, in metres, one time code for each recorded frame. Each robot is an animated
-    Xform over a UsdSkel body with a joint for each mass: bars coloured by stress (white neutral,
-    red tension, blue compression; the robot's custom data say in ``stressScale`` [N] what the full
-    colour means), balls at the masses, its exterior faces as a skin. A scene with a ground gets a
-    checker floor, drawn below z = 0 by the radius of a ball so that balls rest on it; a camera
-    sees every robot in every frame. A robot that was stopped stays as it was; its custom data say
-    when and why. The version and the parameters of the simulation are in the layer's custom data,
-    under ``warp_springs``.
+    Xform over its bars, balls at its masses and its exterior faces as a skin. A scene with a ground
+    gets a checker floor, drawn below z = 0 by the radius of a ball so that balls rest on it;
+    obstacles are drawn where they are, and pushes as arrows while they last. ``/World/Camera`` sees
+    every robot in every frame, ``/World/FollowCamera`` goes with them. A robot that was stopped
+    stays as it was; its custom data say when and why. The version and the parameters of the
+    simulation are in the layer's custom data, under ``warp_springs``.
 
-    The file appears whole or not at all: it is written beside its place and then renamed.
+    Samples go to the disk as they are made, so memory does not grow with the number of frames. The
+    file appears whole or not at all: it is written beside its place and then renamed.
 
     Args:
-        result: What `Simulation.run` returned, recorded with ``fps=``.
+        result: What `Simulation.run` returned, recorded with ``fps=``, or `Result.load` read.
         path: File to write; ``.usdc`` (binary), ``.usda`` (text) or ``.usdz`` (package).
         robots: Indices of recorded robots; all of them by default.
         names: Name of a robot by its index, made unique and valid; ``robot_0007`` by default.
         custom_data: For a robot by its index, what to keep on its prim: numbers, strings,
             booleans, sequences and nested dicts of them, for example fitness and seed.
         grid: Whether several robots are put on a square grid, each starting in the middle of its
-            cell; otherwise all stay where they were simulated.
+            cell; otherwise all stay where they were simulated, as they do among obstacles.
         spacing: Distance of the cells [m]; by default large enough that no two robots touch in
             any frame.
+        geometry: ``"skel"``, a joint for each mass and meshes bound to them: small, and played by
+            every viewer; ``"points"``, Points and BasisCurves, for very large bodies, not shown by
+            phones, game engines and three.js; ``"mesh"``, meshes with moving vertices, large files
+            for whoever knows neither. ``"auto"`` is ``"skel"``, above 1,000 masses ``"points"``.
+        color: ``"stress"`` (white neutral, red tension, blue compression; the robot's custom data
+            say in ``stressScale`` [N] what the full colour means), or ``"material"`` (what each bar
+            is made of, or its class of stiffness where it has no material).
+        springs: ``"all"``, or ``"surface"`` for those between corners of the exterior faces;
+            ``"auto"`` leaves the inner ones out of bodies above 1,000 masses that have faces.
+        progress: Called now and then with the fraction that is done, 0 to 1.
 
     Raises:
-        ValueError: The suffix is unknown, the result has no frames, a robot was not recorded or
-            has no finite frame, a name or custom data belong to a robot that is not exported or
-            hold something that USD cannot, or the spacing is not a positive length.
+        ValueError: The suffix or a choice is unknown, the result has no frames, a robot was not
+            recorded or has no finite frame, a name or custom data belong to a robot that is not
+            exported or hold something that USD cannot, or the spacing is not a positive length.
         OSError: The file cannot be written.
     """
-    path = _checked_path(path)
+    path = checked_output(path, _SUFFIXES)
+    check_choice("geometry", geometry, ("auto", "skel", "points", "mesh"))
+    check_choice("color", color, ("stress", "material"))
+    check_choice("springs", springs, ("auto", "all", "surface"))
     spacing = _checked_spacing(grid, spacing)
     indices = chosen_robots(result, robots)
+    names = dict(names or {})
     _check_keys("names", names, indices)
     _check_keys("custom_data", custom_data, indices)
     notes = {
-        index: _usd_dict(data, f"custom_data[{index}]")
+        index: usd_dict(data, f"custom_data[{index}]")
         for index, data in (custom_data or {}).items()
     }
     tracks = [track(result, index) for index in indices]
-    offsets = placed(tracks, spacing) if grid and len(tracks) > 1 else np.zeros((len(tracks), 3))
+    shown = [_shown(item.robot, springs) for item in tracks]
+    on_grid = grid and len(tracks) > 1 and not result.scene.obstacles
+    drawn = [
+        _Drawn(*each)
+        for each in zip(
+            tracks,
+            shown,
+            [_chosen_geometry(item.robot, geometry) for item in tracks],
+            paints(shown, color),
+            placed(tracks, spacing) if on_grid else np.zeros((len(tracks), 3)),
+            [str(names.get(index, f"robot_{index:04d}")) for index in indices],
+            [notes.get(index, {}) for index in indices],
+            strict=True,
+        )
+    ]
     with _renamed_when_done(path) as draft:
-        _write(result, draft, tracks, offsets, dict(names or {}), notes)
+        _write(result, draft, drawn, progress)
     return path
 
 
 def _write(
-    result: Result,
-    draft: Path,
-    tracks: list[Track],
-    offsets: np.ndarray,
-    names: dict[int, str],
-    notes: dict[int, dict[str, Any]],
+    result: Result, draft: Path, drawn: list[_Drawn], progress: Callable[[float], None] | None
 ) -> None:
     """Write the whole stage into a new binary file."""
     from pxr import Usd, UsdGeom
@@ -110,141 +161,134 @@ def _write(
     from warp_springs.io import usd_stage
 
     stage = usd_stage.new_stage(str(draft), frame_rate(result.times, result.dt), len(result.times))
-    stage.GetRootLayer().customLayerData = {"warp_springs": _provenance(result)}
-    looks = usd_stage.add_looks(stage)
-    boxes = np.stack([item.box for item in tracks]) + offsets[:, None]
-    distance = usd_stage.add_camera(stage, boxes)
-    if result.scene.ground is not None:
-        size = float(np.median([np.linalg.norm(item.high[0] - item.low[0]) for item in tracks]))
-        middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
-        ball = max(item.ball for item in tracks)
-        usd_stage.add_ground(stage, looks, middle, distance, size, ball)
-    usd_stage.add_lights(stage)
-    prims = unique_names([item.index for item in tracks], names, usd_stage.SCENERY)
-    saver = _Saver(stage)
-    for item, offset, prim in zip(tracks, offsets, prims, strict=True):
+    stage.GetRootLayer().customLayerData = {"warp_springs": provenance(result)}
+    looks = usd_stage.add_looks(stage, drawn[0].paint.kinds)
+    _add_surroundings(stage, looks, result, drawn)
+    prims = unique_names([each.name for each in drawn], usd_stage.SCENERY)
+    saver = _Saver(stage, len(drawn), progress)
+    for each, prim in zip(drawn, prims, strict=True):
         xform = UsdGeom.Xform.Define(stage, usd_stage.ROBOTS.AppendChild(prim))
-        xform.GetPrim().SetDisplayName(names.get(item.index, prim))
-        scale = _write_motion(xform, looks, result, item, offset, saver)
-        data = {"warp_springs": _facts(result, item, scale)} | notes.get(item.index, {})
-        xform.GetPrim().SetCustomData(data)
+        xform.GetPrim().SetDisplayName(each.name)
         Usd.ModelAPI(xform).SetKind("component")
+        scale = _write_motion(xform, looks, result, each, saver)
+        data = {"warp_springs": facts(result, each.item, scale)} | each.notes
+        xform.GetPrim().SetCustomData(data)
     stage.Save()
+    saver.done()
+
+
+def _add_surroundings(stage: Usd.Stage, looks: Looks, result: Result, drawn: list[_Drawn]) -> None:
+    """Cameras, floor and lights around the space that the robots take."""
+    from warp_springs.io import usd_stage
+
+    low = np.stack([each.item.low + each.offset for each in drawn])
+    high = np.stack([each.item.high + each.offset for each in drawn])
+    boxes = np.stack([low.min(axis=1), high.max(axis=1)], axis=1)
+    distance = usd_stage.add_camera(stage, boxes)
+    usd_stage.add_follow_camera(stage, low, high, result.times)
+    if result.scene.ground is not None:
+        tile = appearance.tile_size(np.linalg.norm(high[:, 0] - low[:, 0], axis=1))
+        middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
+        ball = max(each.item.ball for each in drawn)
+        usd_stage.add_ground(stage, looks, middle, distance, tile, ball)
+    usd_stage.add_lights(stage)
 
 
 def _write_motion(
-    xform: UsdGeom.Xform,
-    looks: Looks,
-    result: Result,
-    item: Track,
-    offset: np.ndarray,
-    saver: _Saver,
+    xform: UsdGeom.Xform, looks: Looks, result: Result, each: _Drawn, saver: _Saver
 ) -> float:
-    """Write one robot in blocks of frames; returns the tension of the full colour [N]."""
-    from warp_springs.io.usd_skel import SkelRobot
-
-    frames = np.asarray(result.frames(item.index))
-    sample = _spread(len(frames), _SCALE_FRAMES)
-    scale = appearance.stress_scale(_tension(item, frames, sample))
-    writer = SkelRobot(xform, item.robot, looks)
-    step = max(1, _BLOCK_BYTES // writer.bytes_a_frame)
+    """Write one robot in blocks of frames; returns the tension of the full stress colour [N]."""
+    item, frames = each.item, np.asarray(result.frames(each.item.index))
+    radii = (item.bar, item.ball)
+    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii)
+    most = max(1, min(_SCALE_FRAMES, _SCALE_SPRINGS // max(each.robot.n_springs, 1)))
+    scale = appearance.stress_scale(_tension(each, frames, _spread(len(frames), most)))
+    step = max(1, _BLOCK_BYTES // body.bytes_a_frame)
     for first in range(0, len(frames), step):
         block = np.arange(first, min(first + step, len(frames)))
-        positions = frames[item.source[block]].astype(np.float64) + offset
-        stress = appearance.stress_index(_tension(item, frames, block), scale)
-        writer.write(first, positions, stress)
-        saver.wrote(len(block) * writer.bytes_a_frame)
+        positions = frames[item.source[block]].astype(np.float64) + each.offset
+        colors = None
+        if each.paint.shows_stress:
+            colors = appearance.stress_index(_tension(each, frames, block), scale)
+        body.write(first, positions, colors)
+        saver.wrote(len(block) * body.bytes_a_frame, len(block) / len(frames))
+    body.finish()
     return scale
 
 
-def _tension(item: Track, frames: np.ndarray, shown: np.ndarray) -> np.ndarray:
+def _body(geometry: str) -> type[Body]:
+    """The class that writes a geometry."""
+    from warp_springs.io.usd_mesh import MeshBody
+    from warp_springs.io.usd_points import PointsBody
+    from warp_springs.io.usd_skel import SkelBody
+
+    return {"skel": SkelBody, "points": PointsBody, "mesh": MeshBody}[geometry]
+
+
+def _tension(each: _Drawn, frames: np.ndarray, shown: np.ndarray) -> np.ndarray:
     """Tensions [N] in the frames shown, (len(shown), S); an absurd stiffness may overflow."""
+    item = each.item
     with np.errstate(over="ignore"):
-        return item.robot.tension(frames[item.source[shown]], item.times[shown])
-
-
-def _provenance(result: Result) -> dict[str, Any]:
-    """The version and every parameter of the simulation."""
-    parameters = {
-        "version": __version__,
-        "dt": result.dt,
-        "integrator": result.integrator,
-        "precision": result.precision,
-        "device": result.device,
-        "startTime": float(result.times[0]),
-        "endTime": float(result.times[-1]),
-        "scene": dataclasses.asdict(result.scene),
-    }
-    return _usd_dict(parameters, "result")
-
-
-def _facts(result: Result, item: Track, scale: float) -> dict[str, Any]:
-    """What the file itself says of a robot."""
-    from warp_springs.stability import Status
-
-    status = Status(int(result.status[item.index]))
-    facts = {
-        "index": item.index,
-        "status": status.name,
-        "stressScale": scale,
-        "masses": item.robot.n_masses,
-        "springs": item.robot.n_springs,
-    }
-    if status:
-        facts["statusTime"] = float(result.status_time[item.index])
-    if item.held_frames:
-        facts["heldFrames"] = item.held_frames
-    return facts
+        return each.robot.tension(frames[item.source[shown]], item.times[shown])
 
 
 class _Saver:
     """Saves a stage now and then, which hands the written samples from memory to the file."""
 
-    def __init__(self, stage: Usd.Stage) -> None:
+    def __init__(
+        self, stage: Usd.Stage, robots: int, progress: Callable[[float], None] | None
+    ) -> None:
         self._stage, self._unsaved = stage, 0
+        self._robots, self._progress, self._finished = robots, progress, 0.0
 
-    def wrote(self, n_bytes: int) -> None:
-        """Note that samples of so many bytes were written."""
+    def wrote(self, n_bytes: int, share: float) -> None:
+        """Note that samples of so many bytes, such a share of a robot's, were written."""
         self._unsaved += n_bytes
         if self._unsaved >= _BLOCK_BYTES:
             self._stage.Save()
             self._unsaved = 0
+        self._finished += share / self._robots
+        if self._progress is not None:
+            self._progress(min(self._finished, 1.0) * 0.999)  # the file is not there yet
+
+    def done(self) -> None:
+        """All is written."""
+        if self._progress is not None:
+            self._progress(1.0)
 
 
 @contextmanager
 def _renamed_when_done(path: Path) -> Iterator[Path]:
-    """A binary draft in a folder beside ``path``; turned into the file wanted and moved there."""
+    """A binary draft beside ``path``; turned into the file wanted and moved there."""
     from pxr import Sdf, Tf, UsdUtils
 
-    with tempfile.TemporaryDirectory(prefix=".usd-", dir=path.parent) as folder:
-        draft = Path(folder, "robots.usdc")
-        finished = draft.with_suffix(path.suffix.lower())
+    with written_beside(path) as finished:
+        kind = path.suffix.lower()
+        draft = finished if kind == ".usdc" else finished.with_name("robots.usdc")
         try:
             yield draft
-            if finished.suffix == ".usda":
+            if kind == ".usda":
                 Sdf.Layer.FindOrOpen(str(draft)).Export(str(finished))
-            elif finished.suffix == ".usdz":
+            elif kind == ".usdz":
                 UsdUtils.CreateNewUsdzPackage(str(draft), str(finished))
         except Tf.ErrorException as error:
             raise OSError(f"path: USD could not write {path}: {error}") from error
-        finished.replace(path)
     # A stage that is open on the old file in this process shows the new one.
     if layer := Sdf.Layer.Find(str(path)):
         layer.Reload(force=True)
 
 
-def _checked_path(path: str | os.PathLike[str]) -> Path:
-    """Refuse what cannot become a file before any work is done."""
-    path = Path(path)
-    if path.suffix.lower() not in _SUFFIXES:
-        raise ValueError(f"path: got {str(path)!r}, expected a name in {', '.join(_SUFFIXES)}")
-    if path.is_dir():
-        raise IsADirectoryError(f"path: {path} is a folder, expected a file")
-    if not path.parent.is_dir():
-        raise NotADirectoryError(f"path: there is no folder {path.parent} to write into")
-    if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise PermissionError(f"path: no permission to write into the folder {path.parent}")
-    return path
+def _shown(robot: Robot, springs: Springs) -> Robot:
+    """The robot with the springs that are drawn."""
+    if springs == "surface" or (springs == "auto" and robot.n_masses > MOST_JOINTS):
+        return surface_only(robot)
+    return robot
+
+
+def _chosen_geometry(robot: Robot, geometry: Geometry) -> str:
+    if geometry != "auto":
+        return geometry
+    return "points" if robot.n_masses > MOST_JOINTS else "skel"
 
 
 def _checked_spacing(grid: bool, spacing: float | None) -> float | None:
@@ -252,8 +296,7 @@ def _checked_spacing(grid: bool, spacing: float | None) -> float | None:
         return None
     if not grid:
         raise ValueError(f"spacing: got {spacing!r} m with grid=False, which has no cells")
-    if not (math.isfinite(spacing) and spacing > 0.0):
-        raise ValueError(f"spacing: got {spacing!r}, expected a positive length [m]")
+    check_number("spacing", spacing, above=0.0)
     return float(spacing)
 
 
@@ -261,47 +304,6 @@ def _check_keys(name: str, given: Mapping[int, Any] | None, indices: list[int]) 
     for index in given or ():
         if index not in indices:
             raise ValueError(f"{name}: got robot {index!r}, which is not among those exported")
-
-
-def _usd_dict(data: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """A dict of what USD can hold; None is left out.
-
-    Raises:
-        ValueError: A key is no string, or a value is not finite or of a type that USD has not.
-    """
-    converted = {}
-    for key, value in data.items():
-        if not isinstance(key, str) or not key:
-            raise ValueError(f"{where}: got the key {key!r}, expected a name")
-        if value is not None:
-            converted[key] = _usd_value(value, f"{where}[{key!r}]")
-    return converted
-
-
-def _usd_value(value: Any, where: str) -> Any:
-    if isinstance(value, Mapping):
-        return _usd_dict(value, where)
-    if isinstance(value, str):
-        return str(value)
-    array = np.asarray(value)
-    if array.ndim > 1 or array.dtype.kind not in "biufU":
-        raise ValueError(
-            f"{where}: got {value!r}, expected a number, a string, a boolean, a flat sequence of "
-            "one of these, or a dict"
-        )
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise ValueError(f"{where}: got {value!r}, expected finite numbers")
-    if array.dtype.kind in "iu" and (np.abs(array.astype(np.float64)) >= 2.0**63).any():
-        raise ValueError(f"{where}: got {value!r}, expected integers of at most 63 bits")
-    return array.item() if array.ndim == 0 else _vt_array(array)
-
-
-def _vt_array(array: np.ndarray) -> Any:
-    """A flat array as USD's own type: metadata of a layer take no lists."""
-    from pxr import Vt
-
-    kinds = {"f": Vt.DoubleArray, "i": Vt.Int64Array, "u": Vt.Int64Array, "b": Vt.BoolArray}
-    return kinds.get(array.dtype.kind, Vt.StringArray)(array.tolist())
 
 
 def _spread(count: int, most: int) -> np.ndarray:

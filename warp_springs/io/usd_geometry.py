@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import combinations
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -12,61 +12,98 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-TUBE_SIDES = 6
+TUBE_SIDES = 5
+"""Faces around a bar. An odd number: the outline is then almost equally wide from every side."""
+_AXIS_STEPS = 12
+"""Directions of bars are told apart in so many steps across a face of the unit cube."""
 
 
 class Part(NamedTuple):
-    """A mesh of which every vertex follows one mass.
+    """A mesh, of which every vertex may follow one mass.
 
     Attributes:
         points: Vertices [m], shape (V, 3).
-        normals: Outward unit normals for smooth shading, shape (V, 3), or ``None`` for flat faces.
         faces: Corners, counter-clockwise seen from outside, shape (faces, corners).
-        masses: The mass that each vertex follows, shape (V,).
+        masses: The mass that each vertex follows, shape (V,); ``None`` for scenery.
+        normals: Outward unit normals, shape (N, 3), or ``None`` for flat faces.
+        corner_normals: Which of them each corner has, shape (faces, corners), or ``None``.
     """
 
     points: FloatArray
-    normals: FloatArray | None
     faces: IntArray
-    masses: IntArray
+    masses: IntArray | None = None
+    normals: FloatArray | None = None
+    corner_normals: IntArray | None = None
 
 
 def tubes(positions: FloatArray, springs: IntArray, radius: float) -> Part:
     """Every spring as an open tube of `TUBE_SIDES` faces; each end follows its mass.
 
-    A spring without length points up, so that its faces stay finite.
+    The first faces of all tubes come first, then the second ones: a value for each spring that is
+    repeated for its faces is then the same sequence over and over, which packs well. Normals come
+    from one table for all bodies, so that a file holds it once: a tube's ends are cut across the
+    nearest direction of that table, at most 7 degrees from its own. A spring without length points
+    up, so that its faces stay finite.
     """
-    n = TUBE_SIDES
-    axis = positions[springs[:, 1]] - positions[springs[:, 0]]
-    length = np.linalg.norm(axis, axis=1, keepdims=True)
-    axis = np.divide(axis, length, out=np.tile((0.0, 0.0, 1.0), (len(axis), 1)), where=length > 0)
-    u = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(axis, u)
-    angle = np.arange(n)[:, None] * (2.0 * np.pi / n)
-    ring = np.cos(angle) * u[:, None] + np.sin(angle) * v[:, None]
+    n, count = TUBE_SIDES, len(springs)
+    table = ring_normals()
+    axis = nearest_axes(positions[springs[:, 1]] - positions[springs[:, 0]])
+    ring = table.reshape(-1, n, 3)[axis]
     ends = positions[springs][:, :, None] + radius * ring[:, None]
-    side = np.arange(n)
+    side, spring = np.arange(n)[:, None], np.arange(count)
     ahead = (side + 1) % n
-    face = np.stack([side, ahead, ahead + n, side + n], axis=1)
+    corners = np.stack(np.broadcast_arrays(side, ahead, ahead + n, side + n), axis=-1)
     return Part(
         ends.reshape(-1, 3),
-        np.repeat(ring[:, None], 2, axis=1).reshape(-1, 3),
-        _repeated(face, len(springs), 2 * n),
+        (corners + 2 * n * spring[:, None]).reshape(-1, 4).astype(np.int32),
         np.repeat(springs.ravel(), n).astype(np.int32),
+        table,
+        (corners % n + n * axis[:, None]).reshape(-1, 4).astype(np.int32),
     )
 
 
+def nearest_axes(vectors: FloatArray) -> IntArray:
+    """Rows of the table of directions, shape (S,), nearest to vectors (S, 3) or their opposites."""
+    vectors = np.where((vectors == 0.0).all(axis=1, keepdims=True), (0.0, 0.0, 1.0), vectors)
+    face = np.abs(vectors).argmax(axis=1)
+    rows = np.arange(len(vectors))
+    across = np.stack([vectors[rows, (face + k) % 3] for k in (1, 2)]) / vectors[rows, face]
+    u, v = np.rint((across + 1.0) * (_AXIS_STEPS / 2)).astype(np.int32)
+    return (face * (_AXIS_STEPS + 1) + u) * (_AXIS_STEPS + 1) + v
+
+
+@cache
+def axes() -> FloatArray:
+    """The table of directions: unit vectors (A, 3) through a grid on three faces of a cube."""
+    line = np.linspace(-1.0, 1.0, _AXIS_STEPS + 1)
+    u, v = (grid.ravel() for grid in np.meshgrid(line, line, indexing="ij"))
+    first = np.stack([np.ones_like(u), u, v], axis=1)
+    found = np.concatenate([np.roll(first, face, axis=1) for face in range(3)])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+@cache
+def ring_normals() -> FloatArray:
+    """Around each direction of the table, `TUBE_SIDES` unit vectors across it, (A * sides, 3)."""
+    along = axes()
+    u = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(along, u)
+    angle = np.arange(TUBE_SIDES)[:, None] * (2.0 * np.pi / TUBE_SIDES)
+    return (np.cos(angle) * u[:, None] + np.sin(angle) * v[:, None]).reshape(-1, 3)
+
+
 def balls(positions: FloatArray, radius: float) -> Part:
-    """A ball of 80 faces at every mass."""
+    """A ball of 48 faces at every mass."""
     corners, faces = _unit_ball()
     points = positions[:, None] + radius * corners
     m, n = len(positions), len(corners)
     return Part(
         points.reshape(-1, 3),
-        np.tile(corners, (m, 1)),
         _repeated(faces, m, n),
         np.repeat(np.arange(m, dtype=np.int32), n),
+        corners,
+        np.tile(faces, (m, 1)),
     )
 
 
@@ -74,11 +111,11 @@ def skin(positions: FloatArray, faces: IntArray) -> Part:
     """The exterior triangles, no vertex shared, so that every viewer shades them flat."""
     corners = faces.ravel()
     triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
-    return Part(positions[corners], None, triangles, corners)
+    return Part(positions[corners], triangles, corners)
 
 
-def checker(half_tiles: int, tile: float) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
-    """A square floor at z = 0 around the origin: points, quads facing up, which tiles are dark."""
+def checker(half_tiles: int, tile: float) -> tuple[Part, NDArray[np.bool_]]:
+    """A square floor of quads at z = 0 around the origin, and which of its tiles are dark."""
     n = 2 * half_tiles
     line = (np.arange(n + 1) - half_tiles) * tile
     x, y = np.meshgrid(line, line, indexing="ij")
@@ -86,7 +123,7 @@ def checker(half_tiles: int, tile: float) -> tuple[FloatArray, IntArray, NDArray
     corner = i * (n + 1) + j
     quads = np.stack([corner, corner + n + 1, corner + n + 2, corner + 1], axis=1)
     points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    return points, quads.astype(np.int32), (i + j) % 2 == 1
+    return Part(points, quads.astype(np.int32)), (i + j) % 2 == 1
 
 
 def rigid_fit(rest: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -133,25 +170,18 @@ def quaternions(rotations: FloatArray, before: FloatArray | None = None) -> Floa
 
 @cache
 def _unit_ball() -> tuple[FloatArray, IntArray]:
-    """An icosahedron with every face cut in four: 42 corners on the unit sphere, 80 faces."""
-    golden = (1.0 + 5.0**0.5) / 2.0
-    base = np.array([(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
-    corners = np.concatenate([np.roll(base, shift, axis=1) for shift in range(3)])
-    apart = np.linalg.norm(corners[:, None] - corners, axis=2)
-    near = [(a, b) for a, b in combinations(range(12), 2) if abs(apart[a, b] - 2.0) < 1e-9]
-    middle = {pair: 12 + index for index, pair in enumerate(near)}
-    corners = np.concatenate([corners, [corners[a] + corners[b] for a, b in near]])
-    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    """A cube with every face cut in four and blown up: 26 corners, 48 triangles."""
+    corners = np.array([c for c in np.ndindex(3, 3, 3) if c != (1, 1, 1)], np.float64) - 1.0
+    number = {tuple(corner): index for index, corner in enumerate(corners.astype(int).tolist())}
     faces = []
-    for a, b, c in combinations(range(12), 3):
-        if {(a, b), (b, c), (a, c)} <= middle.keys():
-            ab, bc, ac = middle[a, b], middle[b, c], middle[a, c]
-            faces += [(a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac)]
-    faces = np.array(faces, dtype=np.int32)
-    p, q, r = corners[faces].transpose(1, 0, 2)
-    inward = np.einsum("ti,ti->t", np.cross(q - p, r - p), p + q + r) < 0.0
-    faces[inward] = faces[inward, ::-1]
-    return corners, faces
+    for axis, side, a, b in product(range(3), (-1, 1), (-1, 0), (-1, 0)):
+        square = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)][::side]
+        turn = next(k for k, (p, q) in enumerate(square) if p == q == 0)  # cut through the middle
+        p, q, r, s = (
+            number[tuple(np.roll((side, u, v), axis))] for u, v in square[turn:] + square[:turn]
+        )
+        faces += [(p, q, r), (p, r, s)]
+    return corners / np.linalg.norm(corners, axis=1, keepdims=True), np.array(faces, np.int32)
 
 
 def _repeated(faces: IntArray, copies: int, stride: int) -> IntArray:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_springs.elements import PER_SPRING, Elements
+from warp_springs.fields import FIELDS, freeze
 from warp_springs.robot import Robot
 from warp_springs.view import appearance
+from warp_springs.view.palette import material_palette
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
@@ -21,6 +24,7 @@ FloatArray = NDArray[np.float64]
 
 FARTHEST = 1e6
 """Distance from the origin [m] beyond which a frame shows an explosion and not a robot."""
+_BLOCK_VALUES = 2_000_000
 _GAP = 0.35
 """Free space between neighbours on the grid, in sides of the largest footprint."""
 
@@ -38,6 +42,7 @@ class Track:
         low: Lowest corner of its box in each frame [m], shape (F, 3).
         high: Highest corner of its box in each frame [m], shape (F, 3).
         ball: Radius of the balls at its masses [m].
+        bar: Radius of its bars [m].
     """
 
     index: int
@@ -47,6 +52,7 @@ class Track:
     low: FloatArray
     high: FloatArray
     ball: float
+    bar: float
 
     @property
     def held_frames(self) -> int:
@@ -57,6 +63,27 @@ class Track:
     def box(self) -> FloatArray:
         """Lowest and highest corner over all frames [m], shape (2, 3)."""
         return np.stack([self.low.min(axis=0), self.high.max(axis=0)])
+
+
+@dataclass(frozen=True)
+class Paint:
+    """The colours of a robot's bars.
+
+    Attributes:
+        palette: Linear RGB, shape (K, 3); row 0 is what viewers show that know one colour only.
+        rest: Row of the palette for each spring where nothing is animated, shape (S,).
+        kinds: Name and colour of each row if the rows are what bars are made of; else empty, and
+            the colours are those of the stress, in every frame.
+    """
+
+    palette: FloatArray
+    rest: NDArray[np.int32]
+    kinds: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    @property
+    def shows_stress(self) -> bool:
+        """Whether the colours follow the stress."""
+        return not self.kinds
 
 
 def chosen_robots(result: Result, robots: Iterable[int] | None) -> list[int]:
@@ -96,7 +123,8 @@ def track(result: Result, index: int) -> Track:
     """
     robot = result.robots[index]
     frames = np.asarray(result.frames(index))
-    good = (np.abs(frames) <= FARTHEST).all(axis=(1, 2))  # False for NaN
+    low, high = _bounds(frames)
+    good = ((low >= -FARTHEST) & (high <= FARTHEST)).all(axis=1)  # False for NaN
     if not good.any():
         raise ValueError(
             f"robot {index}: no frame has finite positions within {FARTHEST:g} m of the origin; "
@@ -104,13 +132,12 @@ def track(result: Result, index: int) -> Track:
         )
     source = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))
     source = np.maximum(source, good.argmax())
-    shown = frames[source] if not good.all() else frames
     bar, ball = appearance.drawn_radii(robot.lengths)
     reach = max(bar, ball)
     # A robot that was stopped no longer moves, and neither does its actuation.
     times = np.fmin(np.asarray(result.times, dtype=np.float64), result.status_time[index])[source]
-    low, high = shown.min(axis=1) - reach, shown.max(axis=1) + reach
-    return Track(index, robot, times, source, low, high, ball)
+    low, high = low[source] - reach, high[source] + reach
+    return Track(index, robot, times, source, low, high, ball, bar)
 
 
 def placed(tracks: Sequence[Track], spacing: float | None) -> FloatArray:
@@ -140,17 +167,15 @@ def frame_rate(times: FloatArray, dt: float) -> float:
     return float(round(rate)) if abs(rate - round(rate)) <= rate * dt / span else rate
 
 
-def unique_names(
-    indices: Sequence[int], names: Mapping[int, str], taken: Iterable[str]
-) -> list[str]:
-    """A valid prim name for each robot, different from each other and from those taken.
+def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """A valid prim name for each name, different from each other and from those taken.
 
-    ``robot_0007`` by default; characters that USD does not allow become underscores.
+    Characters that USD does not allow become underscores.
     """
     used = {name.lower() for name in taken}
     unique = []
-    for index in indices:
-        name = re.sub(r"[^A-Za-z0-9_]", "_", str(names.get(index, f"robot_{index:04d}")))
+    for wanted in names:
+        name = re.sub(r"[^A-Za-z0-9_]", "_", wanted)
         name = name if re.match("[A-Za-z]", name) else f"robot_{name}"
         candidate, count = name, 1
         while candidate.lower() in used:
@@ -159,6 +184,47 @@ def unique_names(
         used.add(candidate.lower())
         unique.append(candidate)
     return unique
+
+
+def paints(robots: Sequence[Robot], color: str) -> list[Paint]:
+    """The colours of the bars of robots, by ``"stress"`` or by ``"material"``."""
+    if color == "stress":
+        palette = appearance.stress_palette().astype(np.float64)
+        return [Paint(palette, np.zeros(robot.n_springs, np.int32)) for robot in robots]
+    rows, labels = material_palette(robots)
+    names = unique_names([name for name, _ in rows])
+    kinds = {name: rgb for name, (_, rgb) in zip(names, rows, strict=True)}
+    palette = np.array(list(kinds.values()), np.float64).reshape(-1, 3)
+    return [Paint(palette, label.astype(np.int32), kinds) for label in labels]
+
+
+def surface_only(robot: Robot) -> Robot:
+    """The robot without the springs that end inside it; unchanged if it has no faces."""
+    outside = np.zeros(robot.n_masses, bool)
+    outside[robot.faces] = True
+    kept = np.flatnonzero(outside[robot.springs].all(axis=1))
+    if not len(robot.faces) or len(kept) == robot.n_springs:
+        return robot
+    fields = {name: getattr(robot, name)[kept] for name, f in FIELDS.items() if f.per == "spring"}
+    return robot.replace(**fields, elements=_elements_of(robot.elements, kept))
+
+
+def _bounds(frames: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner in each frame, (F, 3); a piece of a long recording at a time."""
+    step = max(1, _BLOCK_VALUES // max(frames[:1].size, 1))
+    pieces = [frames[first : first + step] for first in range(0, len(frames), step)]
+    low = np.concatenate([piece.min(axis=1) for piece in pieces])
+    return low, np.concatenate([piece.max(axis=1) for piece in pieces])
+
+
+def _elements_of(elements: Elements, springs: NDArray[np.intp]) -> Elements:
+    """The elements of some springs of a robot."""
+    arrays = elements.arrays.items()
+    changes: dict[str, Any] = {n: freeze(a[springs]) for n, a in arrays if n in PER_SPRING}
+    if (table := elements.timetable) is not None:
+        rows = {n: freeze(getattr(table, n)[springs]) for n in ("factors", "offsets")}
+        changes["timetable"] = replace(table, **rows)
+    return elements.replace(**changes)
 
 
 def _room(tracks: Sequence[Track], start: FloatArray) -> float:
