@@ -57,9 +57,11 @@ __all__ = [
     "materials",
     "plots",
     "quiet",
+    "read_mesh",
     "render",
     "shapes",
     "stable_dt",
+    "write_mesh",
 ]
 
 try:
@@ -67,14 +69,16 @@ try:
 except PackageNotFoundError:  # a source tree that was never installed
     __version__ = "0+unknown"
 
-# Names whose modules need pxr, matplotlib or Pillow: loaded on first use.
+# Names whose modules need pxr, matplotlib, meshio or Pillow: loaded on first use.
 _LAZY = {
     "Document": ("warp_springs.view.document", "Document"),
     "export_html": ("warp_springs.view.page", "export_html"),
     "export_usd": ("warp_springs.io.usd", "export_usd"),
     "html_page": ("warp_springs.view.page", "html_page"),
     "plots": ("warp_springs.view.plots", None),
+    "read_mesh": ("warp_springs.io.mesh_read", "read_mesh"),
     "render": ("warp_springs.view.picture", "render"),
+    "write_mesh": ("warp_springs.io.mesh_write", "write_mesh"),
 }
 
 

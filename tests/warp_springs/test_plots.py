@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure  # noqa: TID253
-from matplotlib.image import imread  # noqa: TID253
+from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 import warp_springs as ws
 

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils, UsdValidation, Vt  # noqa: TID253
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils, UsdValidation, Vt
 
 import warp_springs as ws
 from warp_springs.io import usd_geometry, usd_layout
