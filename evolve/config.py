@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BODIES",
+    "BudgetConfig",
     "PerturbationConfig",
     "RunConfig",
     "SceneConfig",
@@ -173,6 +174,19 @@ class SimulationConfig(Section):
     device: str = "cpu"
     threads: int | None = Field(None, ge=1)
     """Processor cores to use, all when left out. The results do not depend on it."""
+    devices: tuple[str, ...] = ()
+    """A worker process for each: ["cuda:0", "cuda:1"], or ["cpu", "cpu"]; none when empty. The
+    results do not depend on how many there are."""
+
+    @model_validator(mode="after")
+    def _devices_are_alike(self) -> SimulationConfig:
+        kinds = {device.partition(":")[0] for device in (self.device, *self.devices)}
+        if len(kinds) > 1:
+            raise ValueError(
+                f"devices: {', '.join(self.devices)} are not all of the kind of device, "
+                f"{self.device}; the same robot would not have the same bits on all"
+            )
+        return self
 
     @field_validator("dt", mode="before")
     @classmethod
@@ -264,6 +278,15 @@ class TaskConfig(Section):
         return value
 
 
+class BudgetConfig(Section):
+    """When a run ends, apart from its generations: with the first generation that uses one up."""
+
+    evaluations: int | None = Field(None, ge=1)
+    spring_evaluations: float | None = Field(None, gt=0.0)
+    seconds: float | None = Field(None, gt=0.0)
+    """Of computing, over all its sessions [s]. A run that ends by the clock is not repeatable."""
+
+
 def _known_measure(name: str) -> str:
     if name not in FITNESS:
         raise ValueError(f"expected measures, which are {', '.join(sorted(FITNESS))}")
@@ -296,6 +319,8 @@ class RunConfig(Section):
     population: int = Field(512, ge=1, le=1_000_000)
     """Robots evaluated in each generation."""
     generations: int = Field(60, ge=1)
+    """How many, at most."""
+    budget: BudgetConfig = BudgetConfig()
     body: AnyBody
     encoding: AnyEncoding
     optimizer: AnyOptimizer
@@ -325,11 +350,6 @@ class RunConfig(Section):
         """Names of what is recorded of every robot beside its fitness."""
         wanted = (*DESCRIPTORS, *self.task.descriptors, *self.optimizer.measures)
         return tuple(dict.fromkeys(wanted))
-
-    @property
-    def budget(self) -> int:
-        """Evaluations of the whole run."""
-        return self.population * self.generations
 
     @property
     def fixed_body(self) -> bool:

@@ -88,7 +88,8 @@ def describe(config: RunConfig) -> Iterator[tuple[str, str]]:
     yield (
         "search",
         f"{config.optimizer.type} over {config.encoding.type} genomes, "
-        f"{config.population:,} x {config.generations:,} = {config.budget:,} evaluations, "
+        f"{config.population:,} x {config.generations:,} = "
+        f"{config.population * config.generations:,} evaluations, "
         f"seed {config.seed}",
     )
     task, simulation, period = config.task, config.simulation, config.encoding.period

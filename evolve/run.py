@@ -13,8 +13,8 @@ import platform
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,12 +24,13 @@ import numpy as np
 
 from evolve.config import RunConfig
 from evolve.errors import RunError, StoreError
+from evolve.judge import Simulator
 from evolve.lock import Lock
-from evolve.search import Generation, Search
+from evolve.search import Generation, Search, judge_together
 from evolve.store import Store, Timing
 from evolve.toml import dump, load, parse, validate
 
-__all__ = ["Progress", "Run"]
+__all__ = ["Progress", "Run", "Session", "evolve_together"]
 
 RECORD = "run.sqlite"
 LEFTOVERS = (".*.part", ".usd-*")
@@ -143,30 +144,26 @@ class Run:
             StoreError: Another process evolves this run, or its record is not usable.
             RunError: run.toml was changed since the record was begun.
         """
+        return evolve_together([self], [watch], should_stop)
+
+    @contextmanager
+    def session(self, simulator: Simulator | None = None) -> Iterator[Session]:
+        """Within, the search stands where the record ends, and nobody else continues it.
+
+        Raises:
+            StoreError, RunError: As `evolve`.
+        """
         meta = {"config": dump(self.config), **_origin()}
         with self._locked(), Store.create(self.record_path, meta, self.config.descriptors) as store:
             self._check_unchanged(store)
             with suppress(StoreError), self.exporting():
                 pass  # entering it tidies up, unless somebody is at work there
-            search = Search(self.config)
-            search.restore(store)
-            watch(_Clock().progress(search, None))
-            search.prepare()
-            clock = _Clock()
-            while not search.finished:
-                if should_stop():
-                    return False
-                generation = search.step()
-                store.add_generation(
-                    generation.number,
-                    generation.candidates,
-                    search.encoding.to_bytes(generation.candidates.genomes),
-                    generation.scores,
-                    search.optimizer.state(),
-                    clock.lap(generation),
-                )
-                watch(clock.progress(search, generation))
-        return True
+            search = Search(self.config, simulator)
+            try:
+                search.restore(store)
+                yield Session(search, store)
+            finally:
+                search.close()
 
     @contextmanager
     def exporting(self) -> Iterator[None]:
@@ -219,6 +216,78 @@ class Run:
             file.flush()
             os.fsync(file.fileno())
         draft.replace(self.directory / "run.toml")
+
+
+class Session:
+    """A search, its record, and its pace."""
+
+    def __init__(self, search: Search, store: Store) -> None:
+        self.search, self._store, self._clock = search, store, _Clock()
+
+    def start(self) -> Progress:
+        """Start the clock; how far the search is."""
+        self._clock = _Clock()
+        return self._clock.progress(self.search, None)
+
+    def keep(self, generation: Generation) -> Progress:
+        """Record a generation; how far the search is now."""
+        self._store.add_generation(
+            generation.number,
+            generation.candidates,
+            generation.blobs,
+            generation.scores,
+            self.search.optimizer.state(),
+            self._clock.lap(generation),
+        )
+        return self._clock.progress(self.search, generation)
+
+
+def evolve_together(
+    runs: Sequence[Run],
+    watches: Sequence[Callable[[Progress], None]],
+    should_stop: Callable[[], bool] = lambda: False,
+) -> bool:
+    """Search in several runs that differ in their seed alone, their generations in one batch.
+
+    The record of each is the same to the bit as if it were alone. Those that are behind, because
+    they were killed while the others were recorded, catch up first.
+
+    Args:
+        runs: The runs.
+        watches: For each: told how far it is, before the first step and after each generation.
+        should_stop: Asked before each generation.
+
+    Returns:
+        Whether all runs are complete, rather than stopped.
+
+    Raises:
+        StoreError, RunError: As `Run.evolve`.
+    """
+    with ExitStack() as stack:
+        sessions: list[Session] = []
+        for run in runs:
+            # Perturbed trials follow from the seed: then each run needs a simulator of its own.
+            shared = sessions and run.config.task.trials.count == 1
+            simulator = sessions[0].search.simulator if shared else None
+            sessions.append(stack.enter_context(run.session(simulator)))
+        for session, watch in zip(sessions, watches, strict=True):
+            watch(session.start())
+        sessions[0].search.prepare()
+        for session in sessions:
+            session.start()
+        while going := [i for i, session in enumerate(sessions) if not session.search.finished]:
+            if should_stop():
+                return False
+            first = min(sessions[i].search.optimizer.generation for i in going)
+            going = [i for i in going if sessions[i].search.optimizer.generation == first]
+            searches = [sessions[i].search for i in going]
+            together = len({id(search.simulator) for search in searches}) == 1
+            generations = (
+                judge_together(searches) if together else [search.step() for search in searches]
+            )
+            for i, generation in zip(going, generations, strict=True):
+                watches[i](sessions[i].keep(generation))
+    return True
 
 
 class _Clock:
@@ -279,7 +348,8 @@ def _decisive(config: RunConfig) -> dict[str, Any]:
         "name": True,
         "about": True,
         "generations": True,
-        "simulation": {"threads"},
+        "budget": True,
+        "simulation": {"threads", "devices"},
         "task": {"second_look"},
     }
     flat: dict[str, Any] = {}

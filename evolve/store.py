@@ -275,15 +275,19 @@ class Store:
         cursor = self._connection.execute("SELECT * FROM descriptor LIMIT 0")
         names = [column[0] for column in cursor.description[1:]]
         ids = list(ids)
-        rows = [self._one(query, i) for i in ids]
-        described = [self._one("SELECT * FROM descriptor WHERE individual = ?", i)[1:] for i in ids]
-        table = np.array(described, dtype=np.float64).reshape(len(ids), len(names))
-        return Scores(
-            fitness=np.array([row[0] for row in rows], dtype=np.float64),
-            status=np.array([row[1] for row in rows]),
-            descriptors={name: table[:, i] for i, name in enumerate(names)},
-            spring_evaluations=np.array([row[2] for row in rows]),
+        described = "SELECT * FROM descriptor WHERE individual = ?"
+        rows = [self._one(query, i) + self._one(described, i)[1:] for i in ids]
+        return _scores(rows, names)
+
+    def judged(self, at_once: int = 1024) -> Iterator[tuple[list[bytes], Scores]]:
+        """All genomes with their scores, some at a time, in the order of the ids."""
+        columns = "genome, fitness, status, spring_evaluations, descriptor.*"
+        rows = self._connection.execute(
+            f"SELECT {columns} FROM individual JOIN descriptor ON id = individual ORDER BY id"
         )
+        names = [column[0] for column in rows.description[5:]]
+        while part := rows.fetchmany(at_once):
+            yield [row[0] for row in part], _scores([row[1:4] + row[5:] for row in part], names)
 
     def record(self) -> Record:
         """All evaluations as columns."""
@@ -357,6 +361,17 @@ class Store:
             self._connection.execute("ROLLBACK")
             raise
         self._connection.execute("COMMIT")
+
+
+def _scores(rows: Sequence[tuple], names: Sequence[str]) -> Scores:
+    """Scores from rows of fitness, status, spring evaluations and the descriptors `names`."""
+    described = np.array([row[3:] for row in rows], dtype=np.float64).reshape(-1, len(names))
+    return Scores(
+        fitness=np.array([row[0] for row in rows], dtype=np.float64),
+        status=np.array([row[1] for row in rows]),
+        descriptors={name: described[:, i] for i, name in enumerate(names)},
+        spring_evaluations=np.array([row[2] for row in rows]),
+    )
 
 
 def _packed(item: tuple[str, np.ndarray]) -> tuple[str, str, str, bytes]:

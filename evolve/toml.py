@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from evolve.config import RunConfig
+from evolve.encodings import ENCODINGS
 from evolve.errors import ConfigError
 
 if sys.version_info >= (3, 11):
@@ -97,7 +98,11 @@ def dump(config: RunConfig) -> str:
 
 
 def _override(data: dict[str, Any], dotted: str, value: Any) -> None:
-    """Set a key in nested tables, in place. A new kind of a section starts from its defaults."""
+    """Set a key in nested tables, in place.
+
+    A new kind of a section starts from its defaults; a new encoding keeps what it has in common
+    with the one before.
+    """
     *path, key = dotted.split(".")
     table = data
     for step in path:
@@ -105,8 +110,14 @@ def _override(data: dict[str, Any], dotted: str, value: Any) -> None:
         if not isinstance(table, dict):
             raise ConfigError(f"{dotted}: {step} is a value, not a table")
     if key in ("type", "shape") and table.get(key) != value:
-        table.clear()
+        kept = ENCODINGS[value].Settings.model_fields if _is_encoding(dotted, value) else ()
+        for other in [name for name in table if name not in kept]:
+            del table[other]
     table[key] = value
+
+
+def _is_encoding(dotted: str, value: Any) -> bool:
+    return dotted == "encoding.type" and value in ENCODINGS
 
 
 def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
