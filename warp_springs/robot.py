@@ -23,7 +23,9 @@ from warp_springs.tensions import rest_length_at, tension
 from warp_springs.verbs import Verbs
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Sequence
+    from pathlib import Path
 
     from warp_springs.materials import Material, Region
     from warp_springs.variants import Variants
@@ -354,6 +356,34 @@ class Robot(Verbs):
         from warp_springs.variants import Variants
 
         return Variants(self, stacked)
+
+    # -- files --------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything that the robot is to one ``.npz``; see `warp_springs.io.robots`.
+
+        A file that is there is replaced once the new one is complete.
+
+        Raises:
+            ValueError: The name does not end in ``.npz``.
+            OSError: The file cannot be written.
+        """
+        from warp_springs.io.robots import save_robot
+
+        return save_robot(self, path)
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Robot:
+        """Read a robot that `save` wrote; it is equal to that one.
+
+        Raises:
+            OSError: There is no such file, or it cannot be read.
+            ValueError: It is damaged, holds something else, or is of another version; the message
+                names the file.
+        """
+        from warp_springs.io.robots import load_robot
+
+        return load_robot(path)
 
     # -- a value among values ----------------------------------------------------------------
 

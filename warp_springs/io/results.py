@@ -28,14 +28,14 @@ import math
 import os
 import struct
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
 from warp_springs.io.outputs import checked_output, written_beside
-from warp_springs.io.trees import Reader, Writer
+from warp_springs.io.trees import Reader, Writer, check_header
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
@@ -89,7 +89,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     try:
         entries = _entries(path)
         header = json.loads(entries["header"].item())
-        _check_header(header)
+        check_header(header, FORMAT, VERSION)
         pools = {name[5:]: array for name, array in entries.items() if name.startswith("pool/")}
         reader = Reader(pools, header["objects"])
         fields = {name: reader.value(tree) for name, tree in header["result"].items()}
@@ -116,16 +116,6 @@ class _Rows:
     def unpack(self, buffer: np.ndarray, robot: int) -> np.ndarray:
         """Block (M, 3) of one robot, float64."""
         return np.array(buffer[self._ends[robot] : self._ends[robot + 1]])
-
-
-def _check_header(header: Mapping[str, Any]) -> None:
-    if header.get("format") != FORMAT:
-        raise ValueError(f"format {header.get('format')!r}, expected {FORMAT!r}")
-    if header["version"] != VERSION:
-        raise ValueError(
-            f"version {header['version']} of the layout, written by warp_springs "
-            f"{header['warp_springs']}; this one reads version {VERSION}"
-        )
 
 
 def _write(file: zipfile.ZipFile, name: str, array: np.ndarray) -> None:

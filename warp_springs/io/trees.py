@@ -14,7 +14,7 @@ import numpy as np
 from warp_springs.robot import Robot
 from warp_springs.variants import Variants
 
-__all__ = ["Reader", "Writer"]
+__all__ = ["Reader", "Writer", "check_header"]
 
 _PACKAGE = __name__.partition(".")[0]
 
@@ -131,6 +131,17 @@ class Reader:
             if not isinstance(value, np.ndarray):
                 object.__setattr__(made, name, value)
         return made
+
+
+def check_header(header: Mapping[str, Any], form: str, version: int) -> None:
+    """Refuse, with a ValueError, a file of another form or of another version of its layout."""
+    if header.get("format") != form:
+        raise ValueError(f"format {header.get('format')!r}, expected {form!r}")
+    if header["version"] != version:
+        raise ValueError(
+            f"version {header['version']} of the layout, written by warp_springs "
+            f"{header['warp_springs']}; this one reads version {version}"
+        )
 
 
 def _known(kind: type) -> bool:
