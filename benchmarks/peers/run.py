@@ -1,60 +1,113 @@
-"""Springs per second beside the hand-tuned limit of this processor.
+"""warp_springs beside every alternative: the same robots, checked, then timed in turns.
 
-    python benchmarks/peers/run.py [--robots 1024] [--threads 1 2]
+    python benchmarks/peers/run.py [--quick] [--part table sweep] [--library numba taichi]
 
-Steps the same robots in C++ as a good programmer writes it, in C++ tuned to the limit, and in
-warp_springs, in turns; prints rates, and how far the centers of mass differ from the plain program.
+NumPy, Numba, JAX, Taichi, Newton, the Warp program everybody writes first, and C++, each as its
+users ordinarily write it; Numba, Taichi and JAX also as an expert would; and C++ tuned by hand to
+the limit of the processor. The first run makes an environment for each library in
+benchmarks/peers/.cache (a few minutes, about 2 GB); a library that cannot be installed is reported
+and the others go on.
+
+All step the same population (1,024 cubes of 28 springs, 1,024 lattices of 296), read from the same
+file: symplectic Euler, ground with the classroom's friction, damping, every spring breathing. A
+program's centers of mass must agree with NumPy's in float64 before it is timed. Then all run in
+turns, so that they share whatever else the machine does; ratios are medians over the rounds.
+The sweep does so for populations of 1 to 8,192 and draws benchmarks/figures/peers.png.
 """
 
 import argparse
-import time
+from pathlib import Path
 
-import numpy as np
+import report
+from figure import draw
+from fleet import LIBRARIES, Fleet, cores
+from measure import FEATURES, compare
 from populations import BODIES, problem_of, scene_of, variants
-from programs import in_cpp, in_warp_springs
+from rich.console import Console
 
-PROGRAMS = in_cpp.PROGRAMS | in_warp_springs.PROGRAMS
-CHECKED_STEPS = 500  # 0.05 s: all have landed by then
-
-
-def compare(body: str, precision: str, robots: int, threads: list[int], rounds: int) -> None:
-    """Validate, then time all programs in turns; rates are medians over the rounds."""
-    problem = problem_of(variants(body, robots), scene_of())
-    keys = [(name, count) for count in threads for name in PROGRAMS]
-    programs = {key: PROGRAMS[key[0]](problem, precision, key[1]) for key in keys}
-    centers = {}
-    for key, program in programs.items():
-        program.run(CHECKED_STEPS)
-        centers[key] = problem.center_of_mass(program.positions())
-    rates = {key: [] for key in keys}
-    work = problem.n_robots * problem.n_springs
-    for _ in range(rounds):
-        for key, program in programs.items():
-            steps = max(1, int((2e6 if key[0] == "C++ plain" else 4e7) / work))
-            start = time.perf_counter()
-            program.run(steps)
-            rates[key].append(work * steps / (time.perf_counter() - start))
-    for name, count in keys:
-        rate = np.median(rates[name, count])
-        ratio = np.median(np.divide(rates[name, count], rates["C++ limit", count]))
-        error = np.median(np.abs(centers[name, count] - centers["C++ plain", threads[0]]))
-        print(
-            f"{body:8} {precision} {count} threads {name:13} {rate / 1e6:6,.0f} M springs/s"
-            f"  {ratio:.2f} of the limit  differs by {error:.0e} m",
-            flush=True,
-        )
+FIGURES = Path(__file__).parents[1] / "figures"
+SIZES = (1, 16, 128, 1024, 8192)
+QUICK_SIZES = (1, 64)
 
 
 def main() -> None:
-    """Compare on cubes and lattices."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--robots", type=int, default=1024)
-    parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--rounds", type=int, default=7)
+    """Set up, compare, and write tables, JSON and plot."""
+    args = arguments()
+    console = Console()
+    fleet = Fleet()
+    with console.status("starting") as status:
+        try:
+            fleet.start(args.library, args.threads, status.update)
+            say_who(console, fleet)
+            if "table" in args.part:
+                lines = table(console, fleet, args, status.update)
+                report.write(args.json, fleet, table=lines)
+            if "sweep" in args.part:
+                lines = sweep(console, fleet, args, status.update)
+                report.write(args.json, fleet, sweep=lines)
+                title = f"Cubes of 28 springs, float32, {report.processor()}, {len(cores())} cores"
+                draw(lines, f"{title}\n{FEATURES}", args.figure)
+                console.print(f"wrote {args.figure}")
+        finally:
+            fleet.stop()
+    console.print(f"wrote {args.json}")
+
+
+def arguments() -> argparse.Namespace:
+    """What the command line says."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="small populations, few rounds")
+    parser.add_argument("--part", nargs="+", choices=("table", "sweep"), default=["table", "sweep"])
+    parser.add_argument("--library", nargs="+", choices=LIBRARIES, default=LIBRARIES)
+    parser.add_argument("--body", nargs="+", choices=tuple(BODIES), default=tuple(BODIES))
+    parser.add_argument("--precision", nargs="+", default=("float32", "float64"))
+    parser.add_argument("--threads", type=int, nargs="+", default=sorted({1, len(cores())}))
+    parser.add_argument("--robots", type=int, default=1024, help="population of the table")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=0.2, help="of each program in each round")
+    parser.add_argument("--json", type=Path, default=FIGURES / "peers.json")
+    parser.add_argument("--figure", type=Path, default=FIGURES / "peers.png")
     args = parser.parse_args()
-    for body in BODIES:
-        for precision in ("float64", "float32"):
-            compare(body, precision, args.robots, args.threads, args.rounds)
+    if args.quick:
+        args.robots, args.rounds, args.seconds = min(args.robots, 64), 2, 0.02
+    args.sizes = QUICK_SIZES if args.quick else SIZES
+    return args
+
+
+def say_who(console: Console, fleet: Fleet) -> None:
+    """Name the machine, the versions, and who is missing."""
+    versions = ", ".join(f"{name} {version}" for name, version in fleet.versions.items())
+    console.print(f"{report.processor()}, {len(cores())} cores; {versions}")
+    console.print(FEATURES)
+    for library, reason in fleet.failed.items():
+        console.print(f"{library} does not take part: {reason}")
+
+
+def table(console: Console, fleet: Fleet, args, say) -> list[dict]:
+    """Compare on each body in each precision."""
+    lines = []
+    for body in args.body:
+        problem = problem_of(variants(body, args.robots), scene_of())
+        for precision in args.precision:
+            rows = compare(fleet, problem, precision, 500, args.rounds, args.seconds, say)
+            title = f"{args.robots:,} {body}s of {problem.n_springs} springs, {precision}"
+            report.tables(console, title, rows)
+            lines += report.as_json(rows, body, problem.n_robots, problem.n_springs)
+    return lines
+
+
+def sweep(console: Console, fleet: Fleet, args, say) -> list[dict]:
+    """Compare cubes in float32 for populations of all sizes."""
+    lines = []
+    for robots in args.sizes:
+        problem = problem_of(variants("cube", robots), scene_of())
+        rounds, seconds = min(args.rounds, 3), args.seconds / 2
+        rows = compare(fleet, problem, "float32", 200, rounds, seconds, say)
+        report.tables(console, f"{robots:,} cubes of 28 springs, float32", rows)
+        lines += report.as_json(rows, "cube", robots, problem.n_springs)
+    return lines
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from problem import Problem
 
 import warp_springs as ws
 
-__all__ = ["PROGRAMS", "WarpSprings", "versions"]
+__all__ = ["PROGRAMS", "WarpSprings", "robots_of", "scene_of", "versions"]
 
 
 class WarpSprings:
@@ -15,22 +15,9 @@ class WarpSprings:
     def __init__(self, problem: Problem, precision: str, threads: int) -> None:
         ws.quiet()
         self._problem = problem
-        ground = None
-        if problem.ground_stiffness:
-            ground = ws.Ground(
-                stiffness=problem.ground_stiffness,
-                static_friction=problem.static_friction,
-                kinetic_friction=problem.kinetic_friction,
-                friction="course",
-            )
-        scene = ws.Scene(
-            gravity=tuple(problem.gravity),
-            ground=ground,
-            damping=ws.damping_rate(problem.keep, problem.dt),
-        )
         self._simulation = ws.Simulation(
-            _robots(problem),
-            scene,
+            robots_of(problem),
+            scene_of(problem),
             problem.dt,
             precision=precision,
             integrator="euler",
@@ -47,12 +34,26 @@ class WarpSprings:
         return np.array([self._result.positions(i) for i in range(self._problem.n_robots)])
 
 
-def _robots(problem: Problem) -> ws.Variants:
+def robots_of(problem: Problem) -> ws.Variants:
     """The population as variants of its first robot."""
     names = ("masses", "positions", "velocities", "stiffness", "rest_length", "amplitude", "phase")
     arrays = {name: getattr(problem, name) for name in names}
     body = ws.Robot(springs=problem.springs, **{name: array[0] for name, array in arrays.items()})
     return body.variants(omega=problem.omega, **arrays)
+
+
+def scene_of(problem: Problem) -> ws.Scene:
+    """The world of a problem."""
+    ground = None
+    if problem.ground_stiffness:
+        ground = ws.Ground(
+            stiffness=problem.ground_stiffness,
+            static_friction=problem.static_friction,
+            kinetic_friction=problem.kinetic_friction,
+            friction="course",
+        )
+    damping = ws.damping_rate(problem.keep, problem.dt)
+    return ws.Scene(gravity=tuple(problem.gravity.tolist()), ground=ground, damping=damping)
 
 
 PROGRAMS = {"warp_springs": WarpSprings}

@@ -1,0 +1,131 @@
+"""What was measured, as tables in the terminal and as JSON."""
+
+import json
+import platform
+from pathlib import Path
+
+import numpy as np
+from fleet import Fleet, cores
+from measure import ALLOWED, FEATURES, Row
+from rich.console import Console
+from rich.table import Table
+
+__all__ = ["as_json", "processor", "tables", "write"]
+
+OURS = "warp_springs"
+
+
+def processor() -> str:
+    """The name of the processor."""
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def tables(console: Console, title: str, rows: list[Row]) -> None:
+    """One table: a line for each program, its rates on one core and on all."""
+    names = list(dict.fromkeys(row.program.name for row in rows))
+    counts = sorted({row.program.threads for row in rows})
+    found = {(row.program.name, row.program.threads): row for row in rows}
+    table = Table(title=title, title_justify="left")
+    table.add_column("program", no_wrap=True)
+    for count in counts:
+        table.add_column(f"{_cores(count)}\nM springs/s", justify="right")
+        table.add_column("warp_springs\nis faster", justify="right")
+    table.add_column("differs\nby [m]", justify="right")
+    table.add_column("first\nuse [s]", justify="right")
+    for name in sorted(names, key=lambda name: -_fastest(name, rows)):
+        line = [name]
+        mine = [found[name, count] for count in counts if (name, count) in found]
+        for count in counts:
+            line += _cells(found, name, count)
+        line += [f"{mine[0].error:.0e}", f"{mine[0].first_use:.1f}"]
+        table.add_row(*line)
+    console.print(table)
+    _remarks(console, rows)
+
+
+def _remarks(console: Console, rows: list[Row]) -> None:
+    """Why programs failed, and how those with other physics differ."""
+    for row in rows:
+        if row.failure:
+            console.print(f"{row.program.name} on {_cores(row.program.threads)}: {row.failure}")
+    differing = {row.program.differs: [] for row in rows if row.program.differs}
+    for row in rows:
+        if row.program.differs:
+            differing[row.program.differs].append(row)
+    for how, group in differing.items():
+        names = " and ".join(dict.fromkeys(row.program.name for row in group))
+        console.print(
+            f"{names}: {how}; checked in free flight, where all must agree. In this scene the "
+            f"typical robot strays by {max(row.strays for row in group):.0e} m."
+        )
+
+
+def _fastest(name: str, rows: list[Row]) -> float:
+    return max((np.nan_to_num(row.rate) for row in rows if row.program.name == name), default=0.0)
+
+
+def _cores(count: int) -> str:
+    return "1 core" if count == 1 else f"{count} cores"
+
+
+def _cells(found: dict, name: str, count: int) -> list[str]:
+    """Rate and ratio; a program that uses fewer cores is compared with what it has."""
+    ours = found.get((OURS, count))
+    if (name, count) not in found:
+        fewer = max(c for n, c in found if n == name)
+        return ["", _ratio(ours.times_faster(found[name, fewer])) if ours else ""]
+    row = found[name, count]
+    if row.failure:
+        return ["failed", ""]
+    ratio = _ratio(ours.times_faster(row)) if ours and name != OURS else ""
+    return [f"{row.rate / 1e6:,.1f}" if row.rate < 1e7 else f"{row.rate / 1e6:,.0f}", ratio]
+
+
+def _ratio(value: float) -> str:
+    if np.isnan(value):
+        return ""
+    return f"{value:.2f} x" if value < 10 else f"{value:,.0f} x"
+
+
+def as_json(rows: list[Row], body: str, robots: int, springs: int) -> list[dict]:
+    """The rows as plain values."""
+    return [
+        {
+            "program": row.program.name,
+            "body": body,
+            "robots": robots,
+            "springs_per_robot": springs,
+            "precision": row.precision,
+            "threads": row.program.threads,
+            "features": row.program.differs or FEATURES,
+            "error_m": _number(row.error),
+            "allowed_error_m": ALLOWED[row.precision],
+            "strays_m": _number(row.strays),
+            "first_use_s": _number(row.first_use),
+            "springs_per_second": _number(row.rate),
+            "rates": [float(rate) for rate in row.rates],
+            "failure": row.failure,
+        }
+        for row in rows
+    ]
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
+
+
+def write(path: Path, fleet: Fleet, **parts: list[dict]) -> None:
+    """Write the parts to a file; parts of an earlier run on this machine stay."""
+    known = json.loads(path.read_text()) if path.exists() else {}
+    machine = {"processor": processor(), "cores": len(cores()), "system": platform.platform()}
+    known = known if known.get("machine") == machine else {}
+    versions = known.get("versions", {}) | fleet.versions | {"python": platform.python_version()}
+    known |= {"machine": machine, "versions": versions, "failed": fleet.failed}
+    known |= {name: rows for name, rows in parts.items() if rows}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(known, indent=1) + "\n")
