@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from tests.reference import continuum, energies
+from warp_springs.reference import continuum, energies
 
 pytest.importorskip("scipy")
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")

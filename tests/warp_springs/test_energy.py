@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from tests.reference import energies
+from warp_springs.reference import energies
 
 NAMES = ("kinetic", "gravity", "spring", "ground")
 LEDGER = ("total", "work", "damping_loss", "drag_loss", "friction_loss", "losses", "residual")

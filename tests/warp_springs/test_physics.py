@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from tests.reference import continuum
+from warp_springs.reference import continuum
 
 G = 9.81
 WEIGHTLESS = ws.Scene(gravity=(0, 0, 0), ground=None)

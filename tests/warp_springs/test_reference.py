@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import warp_springs as ws
-from tests.reference import Trial
+from warp_springs.reference import Trial
 
 DT = 2e-4
 STEPS = 200

@@ -1,6 +1,7 @@
 """The physics of warp_springs once more, written plainly: one robot, NumPy, float64.
 
-Nothing here is shared with the simulator. `Trial` repeats its discrete algorithm step by step,
+Nothing here is shared with the simulator, so that ``warp-springs bench`` and the tests can judge it
+by this. `Trial` repeats its discrete algorithm step by step,
 one statement per rule, so that the two must agree to rounding. `continuum` knows no algorithm
 at all: it integrates the differential equations with Runge-Kutta steps, so that the algorithm
 itself can be judged.
@@ -12,6 +13,8 @@ A robot is anything with the arrays of `warp_springs.Robot`, a scene anything wi
 from dataclasses import dataclass
 
 import numpy as np
+
+__all__ = ["Energies", "Trial", "continuum", "energies", "rest_lengths", "spring_forces"]
 
 XY = slice(0, 2)
 Z = 2
@@ -51,6 +54,7 @@ class Energies:
 
     @property
     def total(self):
+        """Their sum [J]."""
         return self.kinetic + self.gravity + self.spring + self.ground
 
 
