@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from evolve.encodings import ENCODINGS
 from evolve.fitness import FITNESS
 from evolve.optimizers import OPTIMIZERS
 from evolve.trials import AGGREGATES
+from warp_springs import config as configs
 
 if TYPE_CHECKING:
-    import warp_springs as ws
     from evolve.encodings import Encoding
     from evolve.optimizers import Optimizer
 
 __all__ = [
-    "BODIES",
     "BudgetConfig",
     "PerturbationConfig",
     "RunConfig",
@@ -36,144 +35,19 @@ LONGEST_AUTO_STEP = 1e-3
 """With dt = "auto" no robot takes a longer step [s]."""
 
 
-class Section(BaseModel):
-    """A table of the configuration: unchangeable, and unknown keys are refused."""
+class SceneConfig(configs.SceneConfig):
+    """Where the robots live; damped unless told otherwise."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class BodyConfig(Section):
-    """A body made by one of the shapes of `warp_springs`, standing on the ground."""
-
-    edge: float = Field(0.1, gt=0.0)
-    """Length of an edge [m]."""
-    stiffness: float = Field(1000.0, gt=0.0)
-    """Stiffness of the springs [N/m] unless the encoding decides it."""
-
-    def build(self) -> ws.Robot:
-        """Make the body."""
-        import warp_springs as ws
-
-        settings = self.model_dump()
-        return getattr(ws.shapes, settings.pop("shape"))(**settings)
-
-
-class CubeConfig(BodyConfig):
-    """Eight masses, 28 springs between all pairs."""
-
-    shape: Literal["cube"]
-    mass: float = Field(0.8, gt=0.0)
-    """Of the whole body [kg]."""
-
-
-class TetrahedronConfig(BodyConfig):
-    """Four masses, six springs."""
-
-    shape: Literal["tetrahedron"]
-    mass: float = Field(0.4, gt=0.0)
-    """Of the whole body [kg]."""
-
-
-class OctahedronConfig(BodyConfig):
-    """Six masses, 15 springs."""
-
-    shape: Literal["octahedron"]
-    mass: float = Field(0.6, gt=0.0)
-    """Of the whole body [kg]."""
-
-
-class LatticeConfig(BodyConfig):
-    """A block of nx x ny x nz voxels."""
-
-    shape: Literal["lattice"]
-    nx: int = Field(ge=1)
-    ny: int = Field(ge=1)
-    nz: int = Field(ge=1)
-    mass_per_vertex: float = Field(0.1, gt=0.0)
-    """[kg]"""
-
-
-class VoxelsConfig(BodyConfig):
-    """Voxels drawn as layers, the lowest first, each a map seen from above.
-
-    A layer is a list of rows, the farthest (largest y) first; a row runs along x and is either a
-    string in which '#' is a voxel and '.' is none, or a list of 1 and 0.
-    """
-
-    shape: Literal["voxels"]
-    layers: tuple[tuple[str | tuple[int, ...], ...], ...]
-    mass_per_vertex: float = Field(0.1, gt=0.0)
-    """[kg]"""
-
-    @field_validator("layers")
-    @classmethod
-    def _rectangular(cls, layers: tuple) -> tuple:
-        voxels = 0
-        for z, layer in enumerate(layers):
-            for y, row in enumerate(layer):
-                where = f"layer {z}, row {y}"
-                if wrong := set(row) - ({"#", "."} if isinstance(row, str) else {0, 1}):
-                    raise ValueError(f"{where}: {wrong.pop()!r} is neither a voxel nor none")
-                if len(layer) != len(layers[0]) or len(row) != len(layers[0][0]):
-                    raise ValueError(f"{where}: every layer and row must be as large as the first")
-                voxels += sum(cell in ("#", 1) for cell in row)
-        if not voxels:
-            raise ValueError("there is no voxel")
-        return layers
-
-    @property
-    def mask(self) -> np.ndarray:
-        """Which voxels exist, shape (nx, ny, nz), bool."""
-        cells = [[[c in ("#", 1) for c in row] for row in layer[::-1]] for layer in self.layers]
-        return np.array(cells, dtype=bool).transpose(2, 1, 0)
-
-    def build(self) -> ws.Robot:
-        """Make the body."""
-        import warp_springs as ws
-
-        settings = self.model_dump(exclude={"shape", "layers"})
-        return ws.shapes.voxels(self.mask, **settings)
-
-
-class GroundConfig(Section):
-    """The plane z = 0; the figures are rubber on concrete."""
-
-    stiffness: float = Field(1e5, gt=0.0)
-    """[N/m]"""
-    static_friction: float = Field(1.0, ge=0.0)
-    kinetic_friction: float = Field(0.8, ge=0.0)
-    friction: Literal["coulomb", "course"] = "coulomb"
-
-
-class SceneConfig(Section):
-    """Where the robots live."""
-
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-    """[m/s^2]"""
     damping: float = Field(1.0, ge=0.0)
     """Rate at which velocities decay [1/s]."""
-    drag: float = Field(0.0, ge=0.0)
-    """Quadratic drag of a mass [kg/m]."""
-    ground: GroundConfig = GroundConfig()
-
-    def build(self) -> ws.Scene:
-        """Make the scene."""
-        import warp_springs as ws
-
-        settings = self.model_dump()
-        return ws.Scene(ground=ws.Ground(**settings.pop("ground")), **settings)
 
 
-class SimulationConfig(Section):
+class SimulationConfig(configs.SimulationConfig):
     """How motion is computed."""
 
     dt: float | Literal["auto"] = 5e-4
     """Time step [s], or "auto": for each robot a millisecond, halved until it is stable."""
-    precision: Literal["float64", "float32"] = "float64"
     integrator: Literal["chin4", "leapfrog", "euler"] = "leapfrog"
-    device: str = "cpu"
-    threads: int | None = Field(None, ge=1)
-    """Processor cores to use, all when left out. The results do not depend on it."""
     devices: tuple[str, ...] = ()
     """A worker process for each: ["cuda:0", "cuda:1"], or ["cpu", "cpu"]; none when empty. The
     results do not depend on how many there are."""
@@ -188,16 +62,8 @@ class SimulationConfig(Section):
             )
         return self
 
-    @field_validator("dt", mode="before")
-    @classmethod
-    def _is_a_step(cls, value: Any) -> Any:
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if value != "auto" and not (number and value > 0.0):
-            raise ValueError("expected a number of seconds above 0, or 'auto'")
-        return value
 
-
-class PerturbationConfig(Section):
+class PerturbationConfig(configs.Section):
     """How the start of a trial is disturbed."""
 
     position: float = Field(0.01, ge=0.0)
@@ -236,7 +102,7 @@ class SecondLookConfig(PerturbationConfig):
     """Which of its perturbed trials counts: 0 the worst, 0.5 the median, 1 the best."""
 
 
-class TaskConfig(Section):
+class TaskConfig(configs.Section):
     """What the robots have to do, and when they are believed."""
 
     fitness: str = "speed"
@@ -278,7 +144,7 @@ class TaskConfig(Section):
         return value
 
 
-class BudgetConfig(Section):
+class BudgetConfig(configs.Section):
     """When a run ends, apart from its generations: with the first generation that uses one up."""
 
     evaluations: int | None = Field(None, ge=1)
@@ -293,21 +159,11 @@ def _known_measure(name: str) -> str:
     return name
 
 
-def _choice(models: Any, key: str) -> Any:
-    """A section whose key says which of several models it is."""
-    models = tuple(models)
-    if len(models) == 1:
-        return models[0]
-    return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 (built at run time)
+AnyEncoding = configs.one_of((cls.Settings for cls in ENCODINGS.values()), "type")
+AnyOptimizer = configs.one_of((cls.Settings for cls in OPTIMIZERS.values()), "type")
 
 
-BODIES = (CubeConfig, TetrahedronConfig, OctahedronConfig, LatticeConfig, VoxelsConfig)
-AnyBody = _choice(BODIES, "shape")
-AnyEncoding = _choice((cls.Settings for cls in ENCODINGS.values()), "type")
-AnyOptimizer = _choice((cls.Settings for cls in OPTIMIZERS.values()), "type")
-
-
-class RunConfig(Section):
+class RunConfig(configs.Section):
     """Everything that decides a run."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
@@ -321,7 +177,7 @@ class RunConfig(Section):
     generations: int = Field(60, ge=1)
     """How many, at most."""
     budget: BudgetConfig = BudgetConfig()
-    body: AnyBody
+    body: configs.AnyShape
     encoding: AnyEncoding
     optimizer: AnyOptimizer
     scene: SceneConfig = SceneConfig()

@@ -49,6 +49,7 @@ __all__ = [
     "Variants",
     "Water",
     "Waveform",
+    "config",
     "damping_rate",
     "export_html",
     "export_usd",
@@ -69,8 +70,9 @@ try:
 except PackageNotFoundError:  # a source tree that was never installed
     __version__ = "0+unknown"
 
-# Names whose modules need pxr, matplotlib, meshio or Pillow: loaded on first use.
+# Names whose modules need pydantic, pxr, matplotlib, meshio or Pillow: loaded on first use.
 _LAZY = {
+    "config": ("warp_springs.config", None),
     "Document": ("warp_springs.view.document", "Document"),
     "export_html": ("warp_springs.view.page", "export_html"),
     "export_usd": ("warp_springs.io.usd", "export_usd"),

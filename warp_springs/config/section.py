@@ -1,0 +1,26 @@
+"""What all tables of a configuration have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Union
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["Section", "Triple", "one_of"]
+
+Triple = tuple[float, float, float]
+
+
+class Section(BaseModel):
+    """A table of a configuration: unchangeable, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def one_of(models: Iterable[type[Section]], key: str) -> Any:
+    """A section whose key says which of several models it is."""
+    models = tuple(models)
+    if len(models) == 1:
+        return models[0]
+    return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 (built at run time)
