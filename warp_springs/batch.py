@@ -9,7 +9,7 @@ decided by the robot alone, never by its neighbours, so its bits do not depend o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,11 +102,13 @@ class Group:
         features: What the kernel must be able to do.
         first: First bundle.
         count: Number of bundles.
+        layout: ``"lanes"``, ``"block"`` or ``"flat"``; all but the first take bundles of width one.
     """
 
     features: Features
     first: int
     count: int
+    layout: str
 
 
 class Batch:
@@ -116,6 +118,7 @@ class Batch:
         robots: The robots.
         scene: Their world.
         method: How they are stepped.
+        layout_of: The layout of a robot with so many masses.
 
     Attributes:
         slots: Where each robot lives.
@@ -127,9 +130,15 @@ class Batch:
         rounding: Energy that rounding alone may give each robot [J], shape (N,).
     """
 
-    def __init__(self, robots: Sequence[Robot], scene: Scene, method: Method) -> None:
+    def __init__(
+        self,
+        robots: Sequence[Robot],
+        scene: Scene,
+        method: Method,
+        layout_of: Callable[[int], str] = lambda masses: "lanes",
+    ) -> None:
         refuse_unsupported(robots, scene)
-        self._scene, self._method = scene, method
+        self._scene, self._method, self._layout_of = scene, method, layout_of
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
@@ -142,26 +151,36 @@ class Batch:
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             strips = self._strips(robots)
-            for width, actuated in sorted(strips, reverse=True):  # wide ones first: alignment
+            for width, actuated, layout in sorted(strips, reverse=True):  # wide first: alignment
                 first = len(self)
-                for strip in strips[width, actuated]:
+                for strip in strips[width, actuated, layout]:
                     self._pack(strip, width, actuated)
                 features = self._features(width, actuated)
-                self.groups.append(Group(features, first, len(self) - first))
+                self.groups.append(Group(features, first, len(self) - first, layout))
             self._finish()
 
     def __len__(self) -> int:
         """Number of bundles."""
         return sum(map(len, self._tables)) if self._tables else 0
 
-    def _strips(self, robots: Sequence[Robot]) -> dict[tuple[int, bool], list[Strip]]:
-        """The robots by width of their bundles, by whether they actuate, and by topology."""
+    def _strips(self, robots: Sequence[Robot]) -> dict[tuple[int, bool, str], list[Strip]]:
+        """The robots by width of their bundles, by whether they actuate, layout and topology."""
         width = native_width(self._method.precision)
-        strips: dict[tuple[int, bool], list[Strip]] = defaultdict(list)
+        strips: dict[tuple[int, bool, str], list[Strip]] = defaultdict(list)
         alone: dict[bool, list[int]] = defaultdict(list)
+        gathered: list[Strip] = []
+        by_hand: list[int] = []
         for cohort in _cohorts(robots):
             if isinstance(cohort, int):
-                alone[robots[cohort].is_actuated].append(cohort)
+                lanes = self._layout_of(robots[cohort].n_masses) == "lanes"
+                (alone[robots[cohort].is_actuated] if lanes else by_hand).append(cohort)
+                continue
+            layout = self._layout_of(int(cohort.masses[0]))
+            if layout == "flat":  # laid out by its own shape, not by that of the first of many
+                by_hand += cohort.ids.tolist()
+                continue
+            if layout == "block":
+                gathered.append(cohort)
                 continue
             for actuated, members in self._alike(cohort):
                 # A robot that would be the only one of its bundle needs no other lanes.
@@ -169,10 +188,30 @@ class Batch:
                     alone[actuated].append(int(cohort.ids[members[-1]]))
                     members = members[:-1]
                 if len(members):
-                    strips[width, actuated].append(cohort.take(members))
+                    strips[width, actuated, "lanes"].append(cohort.take(members))
         for actuated, ids in alone.items():
-            strips[1, actuated].append(Strip.ragged(ids, [robots[i] for i in ids]))
+            strips[1, actuated, "lanes"].append(Strip.ragged(ids, [robots[i] for i in ids]))
+        if by_hand:
+            gathered.append(Strip.ragged(by_hand, [robots[i] for i in by_hand]))
+        for cohort in gathered:
+            for (actuated, layout), strip in self._gathered(cohort, robots):
+                strips[1, actuated, layout].append(strip)
         return strips
+
+    def _gathered(
+        self, cohort: Strip, robots: Sequence[Robot]
+    ) -> Iterator[tuple[tuple[bool, str], Strip]]:
+        """Parts of a cohort that a layout other than the lanes may step together."""
+        layouts = np.array([self._layout_of(masses) for masses in cohort.masses.tolist()])
+        for actuated, members in self._alike(cohort):
+            for layout in np.unique(layouts[members]):
+                part = members[layouts[members] == layout]
+                ids = cohort.ids[part]
+                alike = cohort.take(part) if cohort.shared else None
+                yield (
+                    (actuated, str(layout)),
+                    alike or Strip.ragged(ids, [robots[i] for i in ids.tolist()]),
+                )
 
     def _alike(self, cohort: Strip) -> Iterator[tuple[bool, np.ndarray]]:
         """Members of a cohort that may share bundles: alike in actuation, step and sub-steps."""

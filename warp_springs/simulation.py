@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -13,6 +14,7 @@ from warp_springs.batch import Batch
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
 from warp_springs.kernels.law import EVALUATIONS
+from warp_springs.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.method import AUTO_DT, Method
 from warp_springs.packing import aligned
 from warp_springs.result import Result
@@ -33,7 +35,7 @@ class Simulation:
         scene: The world, the same for all; ``Scene()`` by default.
         dt: Step [s]; or ``"auto"``, half a millisecond, halved for each robot until it is half of
             ``ws.stable_dt`` or less, so that one stiff robot does not slow a thousand.
-        device: ``"cpu"``.
+        device: ``"cpu"``, or a GPU: ``"cuda:0"``.
         precision: ``"float64"``, or ``"float32"`` for about twice the speed.
         integrator: ``"chin4"`` (fourth order, three evaluations of the springs a step),
             ``"leapfrog"`` (second order, one), or ``"euler"`` (symplectic Euler, the classroom's
@@ -42,9 +44,15 @@ class Simulation:
             from the ground's stiffness, its lightest mass and the step.
         threads: CPU threads, by default as many as this process may use.
         limits: What stops a robot; ``Limits()`` by default.
+        layout: How the robots lie in memory and which thread does what; the physics is the same,
+            results agree to rounding. ``"auto"`` chooses for each robot: on a CPU ``"lanes"``
+            (many robots at once, one in each SIMD lane), for a large body ``"flat"`` (its masses
+            shared by all threads); on a GPU ``"block"`` (whole robots in a block of threads, up to
+            1,024 masses), for a larger body ``"flat"``. A CPU runs ``"block"`` slowly, to verify.
 
     Raises:
-        ValueError: An argument is out of range, or there is no robot.
+        ValueError: An argument is out of range, there is no robot, the machine has no such device,
+            or a robot does not fit the layout.
         TypeError: ``robots``, ``scene`` or ``limits`` is something else.
 
     The first use of a combination of features compiles its kernels; they are cached on disk.
@@ -62,6 +70,7 @@ class Simulation:
         contact_substeps: int | None = None,
         threads: int | None = None,
         limits: Limits | None = None,
+        layout: Literal["auto", "lanes", "block", "flat"] = "auto",
     ) -> None:
         self.robots = _check_robots(robots)
         self.scene = _check_type("scene", Scene() if scene is None else scene, Scene)
@@ -71,7 +80,6 @@ class Simulation:
             check_choice("dt", dt, ("auto",))
         else:
             check_number("dt", dt, above=0.0)
-        check_choice("device", str(device), ("cpu",))
         check_choice("precision", precision, ("float64", "float32"))
         check_choice("integrator", integrator, ("chin4", "leapfrog", "euler"))
         if contact_substeps is not None:
@@ -80,15 +88,19 @@ class Simulation:
                 raise ValueError("contact_substeps: 'euler' has none")
         if threads is not None:
             _check_count("threads", threads)
-        self.dt, self.device = AUTO_DT if auto else float(dt), str(device)
+        check_choice("layout", layout, LAYOUTS)
+        place = device_named(device)
+        check_layout(layout, place, [robot.n_masses for robot in _bodies(self.robots)])
+        self.dt, self.device, self.layout = AUTO_DT if auto else float(dt), place.alias, layout
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
-        self._batch = Batch(self.robots, self.scene, self._method)
+        layout_of = functools.partial(choose, layout, place)
+        self._batch = Batch(self.robots, self.scene, self._method, layout_of)
         self._buffers = self._allocate()
-        self._slices = cut(self._batch, self._buffers, self.threads)
+        self._slices = cut(self._batch, self._buffers, self.threads, place)
 
     @property
     def time(self) -> float:
@@ -262,6 +274,11 @@ def _check_robots(robots: Robot | Sequence[Robot]) -> Sequence[Robot]:
         if not isinstance(robot, Robot):
             raise TypeError(f"robots[{index}]: got {type(robot).__name__}, expected a Robot")
     return tuple(robots)
+
+
+def _bodies(robots: Sequence[Robot]) -> Sequence[Robot]:
+    """The robots, or the one whose shape all of them have."""
+    return [robots.body] if isinstance(robots, Variants) else robots
 
 
 def _check_type(name: str, value: object, kind: type):

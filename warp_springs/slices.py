@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
+from warp_springs.crowd import Crowd, crowds
 from warp_springs.kernels.buffers import BUNDLE, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 from warp_springs.packing import aligned
@@ -25,8 +26,10 @@ LAUNCH_WORK = 1e8
 SCRATCH_GAP = 256
 
 
-def cut(batch: Batch, buffers: Mapping[str, np.ndarray], threads: int) -> list[Slice]:
-    """Cut the groups of a batch into slices of about equal work."""
+def cut(
+    batch: Batch, buffers: Mapping[str, np.ndarray], threads: int, device: wp.Device
+) -> list[Slice | Crowd]:
+    """Cut the groups of a batch into slices of about equal work, or into crowds."""
     springs, masses, division = (
         batch.bundles[:, BUNDLE.index(name)] for name in ("springs", "masses", "division")
     )
@@ -35,6 +38,9 @@ def cut(batch: Batch, buffers: Mapping[str, np.ndarray], threads: int) -> list[S
     target = work.sum() / pieces
     slices = []
     for group in batch.groups:
+        if group.layout != "lanes":
+            slices += crowds(group, batch, buffers, device, threads)
+            continue
         here = np.s_[group.first : group.first + group.count]
         total = np.cumsum(work[here])
         inner = np.searchsorted(total, np.arange(target, total[-1], target)) + 1
@@ -52,6 +58,8 @@ class Slice:
     Launches are recorded when the slice is made, on one thread, which also loads the modules
     (loading is not safe on several); threads only launch them.
     """
+
+    launch_work, gang = LAUNCH_WORK, False
 
     def __init__(
         self,
@@ -118,7 +126,7 @@ class Tape:
         done: Steps done so far.
     """
 
-    slice: Slice
+    slice: Slice | Crowd
     slots: Slots
     recorded: np.ndarray
     frame_steps: Sequence[int]
@@ -156,7 +164,7 @@ class Tape:
             self.slice.observe(last)
 
     def _advance(self, first: int, at: int, target: int, stop: threading.Event) -> int:
-        steps = max(1, int(LAUNCH_WORK / max(self.slice.work, 1)))
+        steps = max(1, int(self.slice.launch_work / max(self.slice.work, 1)))
         while at < target and not stop.is_set():
             until = min(at + steps, target)
             self.slice.advance(at, until)
@@ -185,6 +193,8 @@ class Tape:
 def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress=None) -> None:
     """Run all tapes on a pool of threads; the largest first, so that little is left at the end.
 
+    Those that need all threads for themselves come before, one after the other.
+
     ``progress`` is called with the fraction done. On an exception, Ctrl-C included, the threads
     stop after their present launch.
     """
@@ -192,17 +202,24 @@ def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress
     tapes = sorted(tapes, key=lambda tape: -tape.slice.work)
     total = (last - first) * sum(tape.slice.work for tape in tapes)
     with ThreadPoolExecutor(min(threads, len(tapes))) as pool:
-        pending = {pool.submit(tape.run, first, last, stop) for tape in tapes}
         try:
-            while pending:
-                done, pending = wait(pending, timeout=0.1)
-                for future in done:
-                    future.result()
-                if progress is not None and total:
-                    progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
+            for turn in _turns(tapes):
+                pending = {pool.submit(tape.run, first, last, stop) for tape in turn}
+                while pending:
+                    done, pending = wait(pending, timeout=0.1)
+                    for future in done:
+                        future.result()
+                    if progress is not None and total:
+                        progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
         except BaseException:
             stop.set()
             raise
+
+
+def _turns(tapes: Sequence[Tape]) -> list[list[Tape]]:
+    """Tapes that run at the same time."""
+    others = [tape for tape in tapes if not tape.slice.gang]
+    return [[tape] for tape in tapes if tape.slice.gang] + ([others] if others else [])
 
 
 def _recorded(kernel: wp.Kernel, dim: int, given: Mapping[str, object]) -> wp.Launch:

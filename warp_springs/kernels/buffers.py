@@ -1,12 +1,25 @@
 """The flat buffers, declared once: packing, allocation and kernels all read these tables."""
 
 import functools
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import warp as wp
 
-__all__ = ["BUNDLE", "MODEL", "SEEN", "STATE", "Structs", "dtype_of", "structs"]
+__all__ = [
+    "BUNDLE",
+    "MODEL",
+    "REAL",
+    "SEEN",
+    "STATE",
+    "Structs",
+    "array_struct",
+    "dtype_of",
+    "real_type",
+    "struct_of",
+    "structs",
+]
 
 REAL = "real"  # the precision of the run
 
@@ -76,14 +89,28 @@ def dtype_of(name: str, precision: str) -> np.dtype:
     return np.dtype(precision if kind is REAL else kind)
 
 
+def real_type(precision: str) -> type:
+    """The Warp type of a number of the run."""
+    return wp.dtype_from_numpy(np.dtype(precision))
+
+
 @functools.cache
 def structs(precision: str) -> Structs:
     """The structs that kernels of a precision take."""
 
     def struct(name: str, table: dict) -> type:
-        fields = {
-            key: wp.array(dtype=wp.dtype_from_numpy(dtype_of(key, precision))) for key in table
-        }
-        return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+        return array_struct(name, {key: dtype_of(key, precision) for key in table})
 
     return Structs(struct("Model", MODEL), struct("State", STATE), struct("Seen", SEEN))
+
+
+def array_struct(name: str, dtypes: Mapping[str, np.dtype]) -> type:
+    """A Warp struct of arrays of the given element types."""
+    return struct_of(
+        name, {key: wp.array(dtype=wp.dtype_from_numpy(d)) for key, d in dtypes.items()}
+    )
+
+
+def struct_of(name: str, fields: Mapping[str, type]) -> type:
+    """A Warp struct with the given fields."""
+    return wp.struct(type(name, (), {"__annotations__": dict(fields), "__module__": __name__}))

@@ -10,7 +10,7 @@ from warp_springs.kernels.buffers import BUNDLE
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.law import CONSTANTS, LAW
 
-__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "preamble"]
+__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "feature_flags", "preamble"]
 
 #: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
 #: of the simulation.
@@ -37,8 +37,8 @@ class Features:
         return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
 
 
-def preamble(features: Features) -> str:
-    """What both kernels begin with: the number type, the features, the law, the bundle."""
+def feature_flags(features: Features) -> str:
+    """C++ text: the features as compile-time constants."""
     flags = {
         "ACTUATED": features.actuated,
         "GROUND": features.ground,
@@ -50,8 +50,12 @@ def preamble(features: Features) -> str:
         "CHIN4": features.integrator == "chin4",
         "LEDGER": features.ledger,
     }
-    lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
-    lines += [
+    return "\n".join(f"const bool {name} = {str(on).lower()};" for name, on in flags.items()) + "\n"
+
+
+def preamble(features: Features) -> str:
+    """What both kernels begin with: the number type, the features, the law, the bundle."""
+    lines = [
         f"const int64_t {column}_ = model.bundles.data[bundle * {len(BUNDLE)} + {i}];"
         for i, column in enumerate(BUNDLE)
     ]
@@ -59,7 +63,8 @@ def preamble(features: Features) -> str:
     lines += ["const double exact_dt = run[0];"]
     lines += [f"const scalar {name} = scalar(run[{i}]);" for i, name in enumerate(CONSTANTS)]
     lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
-    return vector_dialect(features.precision, features.width) + "\n".join(lines) + LAW + _BUNDLE
+    dialect = vector_dialect(features.precision, features.width) + feature_flags(features)
+    return dialect + "\n".join(lines) + LAW + _BUNDLE
 
 
 # What both kernels need: the blocks of one bundle, one row of springs, its health.

@@ -8,7 +8,7 @@ import functools
 
 import warp as wp
 
-__all__ = ["native_width", "quad_operations", "vector_dialect"]
+__all__ = ["native_width", "quad_operations", "scalar_dialect", "vector_dialect"]
 
 
 @wp.func_native("""
@@ -94,6 +94,39 @@ def vector_dialect(precision: str, width: int) -> str:
     #endif
     }};
     """
+
+
+def scalar_dialect(precision: str) -> str:
+    """The same names for one number, on a GPU or a CPU."""
+    scalar, _, _, tiny, *_ = _TYPES[precision]
+    return f"""
+    typedef {scalar} scalar;
+    typedef scalar real;
+    typedef bool mask;
+    const int W = 1;
+    const scalar TINY = {tiny};
+    const real zero = 0;
+    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
+    auto any = [](mask m) -> bool {{ return m; }};
+    auto square_root = [](real a) -> real {{ return {_ROOT[precision]}; }};
+    auto over_root = [](real h, real a) -> real {{
+    #if defined(__CUDA_ARCH__)
+        {_DEVICE_ROOT[precision]}
+        return (h + h) * y;
+    #else
+        return (h + h) / {_ROOT[precision]};
+    #endif
+    }};
+    """
+
+
+_ROOT = {"float32": "::sqrtf(a)", "float64": "::sqrt(a)"}
+# A GPU's own estimate errs by a bit or two in float32. In float64 the library's takes 1 / sqrt(a)
+# to the last bit.
+_DEVICE_ROOT = {
+    "float32": 'real y; asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(y) : "f"(a));',
+    "float64": "const real y = ::rsqrt(a);",
+}
 
 
 def quad_operations(width: int) -> str:

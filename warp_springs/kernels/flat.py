@@ -1,0 +1,318 @@
+"""The layout for a body too large for a block, on any device.
+
+On a CPU (``threads``) each thread owns a run of slices, the lanes of a register are the slots of
+one, and all steps of a segment run inside one launch a thread: after each pass the threads meet.
+
+On a GPU (``launches``) a thread owns a slot and each pass is a launch; many steps at once are
+captured as a graph, which reads from a clock on the device where it is in time.
+"""
+
+import functools
+from typing import NamedTuple
+
+import warp as wp
+
+from warp_springs.kernels.bundle import STEPS
+from warp_springs.kernels.gather import GatherFeatures, gather_structs, passes, run_type
+
+__all__ = ["JOBS", "Launches", "launches", "threads"]
+
+CPU_OPTIONS = {
+    "enable_backward": False,
+    "optimization_level": 3,
+    "cpu_compiler_flags": "-march=native -mprefer-vector-width=512",
+}
+
+_THREADS = r"""
+const int robot = 0, division_ = 1;
+const long long buffer = 4 * (long long)slots;
+const int first_slice = edges.data[thread], past_slice = edges.data[thread + 1];
+const bool leader = thread == 0;
+int* const gate = gates.data;
+int* const generation = gate + 32;  // on a cache line of its own
+int* const health = state.states.data;
+
+// All threads wait for the last one.
+typedef void Yield();
+auto meet = [=]() {
+    if (threads == 1) return;
+    const int before = __atomic_load_n(generation, __ATOMIC_ACQUIRE);
+    if (__atomic_add_fetch(gate, 1, __ATOMIC_ACQ_REL) == threads) {
+        __atomic_store_n(gate, 0, __ATOMIC_RELAXED);
+        __atomic_store_n(generation, before + 1, __ATOMIC_RELEASE);
+        return;
+    }
+    for (int spins = 0; __atomic_load_n(generation, __ATOMIC_ACQUIRE) == before; ++spins) {
+    #if defined(__x86_64__)
+        __builtin_ia32_pause();
+    #endif
+        // Somebody else may need this core to get there.
+        if (spins > 4000 && give_way != 0) ((Yield*)give_way)();
+    }
+};
+
+int side = (int)(first_step & 1);  // each step has an odd number of passes
+auto now = [&]() -> scalar* { return state.positions.data + side * buffer; };
+auto then = [&]() -> scalar* { return state.positions.data + (1 - side) * buffer; };
+auto flip = [&]() { meet(); side = 1 - side; };
+scalar sine = state.oscillators.data[0], cosine = state.oscillators.data[1];
+real power = zero;
+
+auto slices = [=](auto work) __attribute__((always_inline)) {
+    for (int slice = first_slice; slice < past_slice; ++slice)
+        work(Slot{slice, 0, robot, slice * W, 0});
+};
+auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__((always_inline)) {
+    slices([&](Slot at) __attribute__((always_inline)) {
+        Vec v = load(state.velocities.data, at);
+        real* const rest = in_slice(state.rests.data, at, 1);
+        real left = CHIN4 && last ? *rest : zero;
+        move_slot(at, now(), then(), v, left, sine, cosine, shifted, time, start, last);
+        if (CHIN4 && !last) *rest = left;
+        store(state.velocities.data, at, v);
+    });
+    flip();
+};
+auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last) {
+    move(shifted, time, start, last);
+};
+auto euler = [&]() { move(false, dt, false, true); };
+auto gradient_shift = [&]() {
+    slices([&](Slot at) __attribute__((always_inline)) {
+        shift_slot(at, now(), then(), sine, cosine);
+    });
+    flip();
+};
+auto enter_work = [](scalar) {};
+
+auto all_stopped = [=]() -> bool { return *health != 0; };
+auto check = [&](long long n) {
+    int bits = 0;
+    slices([&](Slot at) { bits |= trouble(at, now(), load(state.velocities.data, at)); });
+    raise(state.flags.data, bits);
+    meet();
+    const int found = __atomic_load_n(state.flags.data, __ATOMIC_ACQUIRE);
+    const bool stop = found != 0 || *health != 0;
+    slices([&](Slot at) {
+        Vec v = load(state.velocities.data, at);
+        settle(at, stop, now(), then(), v);
+        store(state.velocities.data, at, v);
+    });
+    meet();
+    if (leader) {
+        if (found && *health == 0) {
+            *health = status_of(found);
+            state.state_times.data[0] = double(n) * run.exact_dt;
+        }
+        *state.flags.data = 0;
+    }
+    meet();
+};
+auto set_oscillators = [&](long long n) { oscillator(robot, n, sine, cosine); };
+auto turn_oscillators = [&]() { if (ACTUATED) turn(robot, sine, cosine); };
+auto prepare = []() {};
+auto begin = []() {};
+auto end = []() {};
+"""
+
+_THREADS_END = r"""
+meet();  // all have read the oscillators
+if (leader)
+    for (int s = 0; s < 2; ++s) {
+        state.oscillators.data[2 * s] = sine;
+        state.oscillators.data[2 * s + 1] = cosine;
+    }
+"""
+
+
+@functools.cache
+def threads(features: GatherFeatures) -> wp.Kernel:
+    """The kernel that one of several threads launches to step one body on a CPU."""
+    Model, State = gather_structs(features.precision)
+    Run = run_type(features.precision)
+    module = wp.get_module(features.name)
+    wp.set_module_options(CPU_OPTIONS, module)
+
+    @wp.func_native(passes(features) + _THREADS + STEPS + _THREADS_END)
+    def advance_body(
+        model: Model,
+        state: State,
+        run: Run,
+        slots: int,
+        edges: wp.array(dtype=wp.int32),
+        gates: wp.array(dtype=wp.int32),
+        give_way: wp.uint64,
+        threads: int,
+        thread: int,
+        first_step: wp.int64,
+        last_step: wp.int64,
+    ): ...
+
+    @wp.kernel(module=module)
+    def advance(
+        model: Model,
+        state: State,
+        run: Run,
+        slots: int,
+        edges: wp.array(dtype=wp.int32),
+        gates: wp.array(dtype=wp.int32),
+        give_way: wp.uint64,
+        threads: int,
+        thread: int,
+        first_step: wp.int64,
+        last_step: wp.int64,
+    ):
+        advance_body(
+            model,
+            state,
+            run,
+            slots,
+            edges,
+            gates,
+            give_way,
+            threads,
+            thread,
+            first_step,
+            last_step,
+        )
+
+    return advance
+
+
+#: The passes of a step, in order: name, and the integrators that have it.
+JOBS = {
+    "kick": ("euler", "leapfrog", "chin4"),
+    "shift": ("chin4",),
+    "last_kick": ("chin4",),
+}
+
+_LAUNCHES = r"""
+const long long n = clock.data[0] + offset;
+const long long buffer = 4 * (long long)slots;
+const int slice = slot / SLICE;
+const int robot = model.slices.data[slice * SITE_COLUMNS];
+const Slot at = {slice, slot % SLICE, robot, slot, model.robots.data[robot * ROBOT_COLUMNS]};
+const bool leader = slot == at.base, stopped = state.states.data[robot] != 0;
+"""
+
+_PASS = r"""
+const int side = (int)((n + PASS) & 1);
+scalar* const now = state.positions.data + side * buffer;
+scalar* const then = state.positions.data + (1 - side) * buffer;
+const scalar* const wave = state.oscillators.data + 2 * ((long long)side * robots + robot);
+scalar* const next = state.oscillators.data + 2 * ((long long)(1 - side) * robots + robot);
+const scalar sine = wave[0], cosine = wave[1];
+if (leader && ACTUATED) {
+    scalar si = sine, co = cosine;
+    if (PASS != 1) turn(robot, si, co);
+    next[0] = si; next[1] = co;
+}
+if (stopped || model.homes.data[slot] < 0) return;
+if (PASS == 1) shift_slot(at, now, then, sine, cosine);
+else {
+    const bool start = PASS == 0 && n == 0, last = !CHIN4 || PASS == 2;
+    const scalar time = EULER ? dt : PASS == 2 ? GRADIENT_KICK
+        : start ? FIRST_KICK : FIRST_KICK * scalar(2);
+    Vec v = load(state.velocities.data, at);
+    real rest = CHIN4 && last ? state.rests.data[slot] : zero;
+    move_slot(at, now, then, v, rest, sine, cosine, PASS == 2, time, start, last);
+    if (CHIN4 && !last) state.rests.data[slot] = rest;
+    store(state.velocities.data, at, v);
+}
+"""
+
+_FIND = r"""
+if (stopped) return;
+const scalar* const now = state.positions.data + (n & 1) * buffer;
+raise(state.flags.data + robot, trouble(at, now, load(state.velocities.data, at)));
+"""
+
+_SETTLE = r"""
+const int side = (int)(n & 1);
+scalar* const now = state.positions.data + side * buffer;
+Vec v = load(state.velocities.data, at);
+settle(at, stopped || state.flags.data[robot] != 0, now,
+       state.positions.data + (1 - side) * buffer, v);
+store(state.velocities.data, at, v);
+"""
+
+_WIND = r"""
+const long long n = clock.data[0] + offset;
+const int robot = slot, found = state.flags.data[robot];
+state.flags.data[robot] = 0;
+if (found && state.states.data[robot] == 0) {
+    state.states.data[robot] = status_of(found);
+    state.state_times.data[robot] = double(n) * run.exact_dt;
+}
+if (ACTUATED) {
+    scalar* const wave = state.oscillators.data + 2 * ((n & 1) * robots + robot);
+    oscillator(robot, n, wave[0], wave[1]);
+}
+"""
+
+
+class Launches(NamedTuple):
+    """Kernels of one set of features, launched over slots, ``wind`` over robots.
+
+    Attributes:
+        steps: The passes of a step, in order.
+        check: ``find``, ``settle`` and ``wind``, every ``CHECK_EVERY`` steps.
+        tick: Moves the clock on.
+    """
+
+    steps: list[wp.Kernel]
+    check: list[wp.Kernel]
+    tick: wp.Kernel
+
+
+@functools.cache
+def launches(features: GatherFeatures) -> Launches:
+    """The kernels that step crowds a pass a launch."""
+    Model, State = gather_structs(features.precision)
+    Run = run_type(features.precision)
+    module = wp.get_module(features.name)
+    wp.set_module_options({"enable_backward": False}, module)
+    text = passes(features)
+
+    def kernel(name: str, snippet: str) -> wp.Kernel:
+        @wp.func_native(text + snippet)
+        def work(
+            model: Model,
+            state: State,
+            run: Run,
+            slots: int,
+            robots: int,
+            clock: wp.array(dtype=wp.int64),
+            offset: int,
+            slot: int,
+        ): ...
+
+        @wp.kernel(module=module, name=name)
+        def launch(
+            model: Model,
+            state: State,
+            run: Run,
+            slots: int,
+            robots: int,
+            clock: wp.array(dtype=wp.int64),
+            offset: int,
+        ):
+            work(model, state, run, slots, robots, clock, offset, wp.tid())
+
+        return launch
+
+    @wp.kernel(module=module)
+    def tick(clock: wp.array(dtype=wp.int64), steps: int):
+        clock[0] = clock[0] + wp.int64(steps)
+
+    steps = [
+        kernel(job, f"const int PASS = {index};\n" + _LAUNCHES + _PASS)
+        for index, (job, integrators) in enumerate(JOBS.items())
+        if features.integrator in integrators
+    ]
+    check = [
+        kernel("find", _LAUNCHES + _FIND),
+        kernel("settle", _LAUNCHES + _SETTLE),
+        kernel("wind", _WIND),
+    ]
+    return Launches(steps, check, tick)
