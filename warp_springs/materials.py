@@ -42,6 +42,14 @@ COURSE_OMEGA = 2.0 * math.pi
 """Angular frequency [rad/s] of a robot whose first muscle does not find one."""
 
 
+def linear_rgb(color: str, name: str = "color") -> tuple[float, float, float]:
+    """Linear RGB in 0 ... 1 of an sRGB colour ``"#rrggbb"``, which a ValueError refuses by name."""
+    if not isinstance(color, str) or not re.fullmatch("#[0-9a-fA-F]{6}", color):
+        raise ValueError(f"{name}: got {color!r}, expected '#rrggbb'")
+    shares = (int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
+    return tuple(s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares)
+
+
 @dataclass(frozen=True)
 class Material:
     """What springs are made of.
@@ -83,8 +91,7 @@ class Material:
             )
         if self.modulus is not None and self.section is None:
             raise ValueError(f"{self.name}: a modulus needs a section [m^2]: k = E A / L")
-        if not isinstance(self.color, str) or not re.fullmatch("#[0-9a-fA-F]{6}", self.color):
-            raise ValueError(f"{self.name}.color: got {self.color!r}, expected '#rrggbb'")
+        linear_rgb(self.color, f"{self.name}.color")
 
     def stiffness_of(self, lengths: ArrayLike) -> FloatArray:
         """Stiffness [N/m] of springs of some lengths [m], same shape: k, or E A / L.
@@ -102,8 +109,7 @@ class Material:
     @property
     def rgb(self) -> tuple[float, float, float]:
         """The colour as linear RGB in 0 ... 1, as renderers want it."""
-        shares = (int(self.color[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-        return tuple(s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares)
+        return linear_rgb(self.color)
 
 
 TISSUE = Material("tissue", stiffness=1_000.0, density=1_060.0, color="#e8b49c")

@@ -22,10 +22,16 @@ PUSH = (0.86, 0.36, 0.01)
 """Colour of the arrows that stand for external forces."""
 OBSTACLE = (0.52, 0.44, 0.36)
 """Colour of obstacles."""
+OBSTACLE_DARK = (0.36, 0.30, 0.24)
+"""Colour of every other tile of an obstacle that is tiled."""
 MASS = (0.012, 0.013, 0.016)
 """Colour of the spheres that stand for masses."""
 SKIN = (0.26, 0.47, 0.66)
 """Colour of the exterior triangles."""
+WATER = (0.12, 0.38, 0.60)
+"""Colour of the lines on the surface of water."""
+HELD = (0.45, 0.46, 0.48)
+"""Colour of the spheres of masses that are fixed or held to something."""
 GROUND_LIGHT = (0.70, 0.72, 0.75)
 """Colour of one half of the checker's tiles."""
 GROUND_DARK = (0.42, 0.46, 0.54)
@@ -59,11 +65,15 @@ def stress_palette() -> NDArray[np.float32]:
     Entry 0 is neutral, 1 ... STRESS_STEPS go to full tension, the rest to full compression. A
     viewer that shows only one entry of an indexed colour takes entry 0, hence the order.
     """
+    return _diverging_palette(TENSION, COMPRESSION)
+
+
+def _diverging_palette(above: ArrayLike, below: ArrayLike) -> NDArray[np.float32]:
+    """Return a table like `stress_palette` that goes to two other colours."""
     share = np.arange(1, STRESS_STEPS + 1)[:, None] / STRESS_STEPS
     neutral = np.array(NEUTRAL)
-    tension = neutral + share * (np.array(TENSION) - neutral)
-    compression = neutral + share * (np.array(COMPRESSION) - neutral)
-    return np.concatenate((neutral[None], tension, compression)).astype(np.float32)
+    sides = [neutral + share * (np.asarray(color) - neutral) for color in (above, below)]
+    return np.concatenate((neutral[None], *sides)).astype(np.float32)
 
 
 def stress_scale(tension: ArrayLike, percentile: float = 95.0) -> float:
@@ -97,6 +107,16 @@ def stress_index(tension: ArrayLike, scale: float) -> NDArray[np.int32]:
 def stress_color(tension: ArrayLike, scale: float) -> NDArray[np.float32]:
     """Return linear RGB, (..., 3), for spring forces in N of shape (...)."""
     return stress_palette()[stress_index(tension, scale)]
+
+
+def actuation_color(strain: ArrayLike, scale: float) -> NDArray[np.float32]:
+    """Return linear RGB, (..., 3), for what muscles do now.
+
+    Args:
+        strain: Change of the rest length as a share of its mean, (...); 0 is what does not move.
+        scale: Strain in full colour, positive.
+    """
+    return _diverging_palette(LONGER, SHORTER)[stress_index(strain, scale)]
 
 
 def drawn_radii(rest_length: ArrayLike) -> tuple[float, float]:

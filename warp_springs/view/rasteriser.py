@@ -29,7 +29,6 @@ _SAMPLES = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
 _BAND_ROWS = 90
 _CUDA_BAND_ROWS = 2160
 _CUDA_PARTS = 16
-_MAP_SIZE = 1024
 _SUN_SPREAD = 0.07
 _LONGEST_REACH = 40
 
@@ -55,6 +54,8 @@ class Drawing:
         ball_color: (K, 3).
         floor: Height of the floor; None draws none.
         tile: Edge of a tile of the floor's checker.
+        casters: How many of the first points throw shadows: the sun's map covers these, the rest
+            may lie outside; None: all.
     """
 
     points: NDArray[np.float64]
@@ -68,13 +69,18 @@ class Drawing:
     ball_color: NDArray[np.floating] = field(default_factory=_none(3))
     floor: float | None = 0.0
     tile: float = 0.1
+    casters: int | None = None
 
 
 class Rasteriser:
     """Draws pictures of one size on one device; keeps its buffers from picture to picture."""
 
     def __init__(
-        self, size: tuple[int, int] = (1280, 720), device: str = "cpu", threads: int | None = None
+        self,
+        size: tuple[int, int] = (1280, 720),
+        device: str | wp.Device = "cpu",
+        threads: int | None = None,
+        map_size: int = 1024,
     ):
         """Allocate the buffers.
 
@@ -83,11 +89,13 @@ class Rasteriser:
             device: A Warp device, "cpu" or "cuda:0".
             threads: How many threads draw on a CPU; default one for each core that the process
                 may use. A CUDA device is driven by one thread.
+            map_size: Texels along the edge of the map that shadows come from, 256 ... 1024.
 
         Raises:
             ValueError: For a size or a number of threads out of range.
         """
         self.size = _checked_size(size)
+        self._map_size, self._asked_threads = map_size, threads
         self.device = wp.get_device(device)
         self._launch = functools.partial(wp.launch, device=self.device)
         if threads is not None and threads < 1:
@@ -105,9 +113,13 @@ class Rasteriser:
         self._picture = wp.zeros((height, width, 3), dtype=wp.uint8, device=self.device)
         keys = width * self._band_rows * len(_SAMPLES)
         self._keys = [self._empty_keys(keys) for _ in range(self._threads)]
-        self._map = self._empty_keys(_MAP_SIZE * _MAP_SIZE)
-        table = (_MAP_SIZE + 1, _MAP_SIZE + 1)
+        self._map = self._empty_keys(map_size * map_size)
+        table = (map_size + 1, map_size + 1)
         self._sums = wp.zeros(table, dtype=wp.vec2i, device=self.device)
+
+    def of_size(self, size: tuple[int, int], map_size: int) -> Rasteriser:
+        """Return one of another size that draws on the same device with as many threads."""
+        return Rasteriser(size, self.device, self._asked_threads, map_size)
 
     def draw(self, drawing: Drawing, camera: Camera) -> NDArray[np.uint8]:
         """Return the picture, (H, W, 3) uint8 sRGB; the same input gives the same bits.
@@ -211,18 +223,19 @@ class Rasteriser:
         axes = view_axes(np.negative(TO_SUN))
         seen = drawing.points @ axes.T
         thickest = np.concatenate(([1e-3], drawing.bar_radius, drawing.ball_radius)).max()
-        low, high = seen.min(axis=0) - thickest, seen.max(axis=0) + thickest
+        low, high = _corners(seen[: drawing.casters], thickest)
         # steps of scale and whole texels keep the shadow's edges still from frame to frame
         edge = 2.0 ** (math.ceil(4 * math.log2(1.02 * float((high - low)[:2].max()))) / 4)
-        texel = edge / (_MAP_SIZE - 2 * _LONGEST_REACH - 4)
-        origin = np.append(np.rint((low + high)[:2] / 2 / texel) * texel, low[2] - thickest)
+        texel = edge / (self._map_size - 2 * _LONGEST_REACH - 4)
+        nearest = seen[:, 2].min() - 2 * thickest
+        origin = np.append(np.rint((low + high)[:2] / 2 / texel) * texel, nearest)
 
         lens = raster.Lens()
         lens.perspective = 0
         lens.focal = 1 / texel
-        lens.center_x = lens.center_y = _MAP_SIZE / 2
+        lens.center_x = lens.center_y = self._map_size / 2
         lens.near = 0.0
-        lens.width = lens.rows = _MAP_SIZE
+        lens.width = lens.rows = self._map_size
         lens.first_row = 0
         lens.parts = self._parts
 
@@ -232,21 +245,23 @@ class Rasteriser:
         sun.turn = wp.mat33((axes @ camera.axes.T).ravel())
         sun.shift = wp.vec3(*(axes @ camera.eye - origin))
         sun.scale = 1 / texel
-        sun.center = _MAP_SIZE / 2
-        sun.size = _MAP_SIZE
+        sun.center = self._map_size / 2
+        sun.size = self._map_size
         # the height of a point X, Y, Z of the sun's view above the floor is rise . (X, Y, Z) + foot
         height = drawing.floor or 0.0
         rise, foot = axes[:, 2], axes[:, 2] @ origin - height
         slope = -rise[:2] / rise[2] * texel
-        sun.floor = wp.vec3(-foot / rise[2] - slope.sum() * _MAP_SIZE / 2, *slope)
+        sun.floor = wp.vec3(-foot / rise[2] - slope.sum() * self._map_size / 2, *slope)
         longest_way = (drawing.points[:, 2].max() + thickest - height) / -rise[2]
         sun.spread = _SUN_SPREAD
         sun.reach = int(np.clip(_SUN_SPREAD * longest_way / texel, 2, _LONGEST_REACH))
 
         points = self._array(seen - origin, wp.vec3)
         self._draw_surfaces(lens, self._middle, points, surfaces, self._map)
-        self._launch(shading.sum_rows, _MAP_SIZE, inputs=[sun, self._map], outputs=[self._sums])
-        threads = -(-_MAP_SIZE // int(shading.COLUMNS_A_THREAD))
+        self._launch(
+            shading.sum_rows, self._map_size, inputs=[sun, self._map], outputs=[self._sums]
+        )
+        threads = -(-self._map_size // int(shading.COLUMNS_A_THREAD))
         self._launch(shading.sum_columns, threads, inputs=[], outputs=[self._sums])
         return sun
 
@@ -264,6 +279,11 @@ def draw(
 ) -> NDArray[np.uint8]:
     """Return one picture, (H, W, 3) uint8 sRGB; for many of one size keep a `Rasteriser`."""
     return Rasteriser(size, device).draw(drawing, camera)
+
+
+def _corners(points: NDArray[np.float64], margin: float) -> tuple[NDArray, NDArray]:
+    """Return the lowest and the highest corner of a box with a margin around points (P, 3)."""
+    return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 
 def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warp_springs.surfaces import Box, HeightField, Plane, Sphere
 
-__all__ = ["obstacle_mesh"]
+__all__ = ["grid_mesh", "obstacle_mesh"]
 
 Mesh = tuple[NDArray[np.float64], NDArray[np.int32]]
 
@@ -28,14 +28,14 @@ def obstacle_mesh(obstacle: Plane | Sphere | Box | HeightField, box: ArrayLike) 
     if isinstance(obstacle, Plane):
         return _plane(obstacle, np.asarray(box, np.float64))
     if isinstance(obstacle, Sphere):
-        points, triangles = _grid(RINGS + 1, SIDES + 1)
+        points, triangles = grid_mesh(RINGS + 1, SIDES + 1)
         polar, around = np.pi * points[:, 0] / RINGS, 2.0 * np.pi * points[:, 1] / SIDES
         unit = (np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar))
         return np.array(obstacle.center) + obstacle.radius * np.stack(unit, axis=1), triangles
     if isinstance(obstacle, Box):
         half = 0.5 * np.array(obstacle.size)
         return np.array(obstacle.center) + (_CORNERS * half) @ obstacle.rotation.T, _BOX
-    points, triangles = _grid(*obstacle.heights.shape)
+    points, triangles = grid_mesh(*obstacle.heights.shape)
     points[:, :2] *= obstacle.spacing
     points[:, 2] = obstacle.heights.ravel()
     return points + np.array(obstacle.origin), triangles
@@ -51,7 +51,7 @@ def _plane(plane: Plane, box: NDArray[np.float64]) -> Mesh:
     return square, np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
-def _grid(rows: int, columns: int) -> Mesh:
+def grid_mesh(rows: int, columns: int) -> Mesh:
     """Points (i, j, 0) of a grid, and its triangles, whose normals are +z."""
     i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
     points = np.stack([i, j, np.zeros_like(i)], axis=-1).reshape(-1, 3).astype(np.float64)
