@@ -55,6 +55,10 @@ class Floor:
     dark: wp.vec3
     sky: wp.vec3
     zenith: wp.vec3
+    wet: int  # whether there is water
+    depth: float  # of the water's surface below the eye [m]
+    clarity: float  # way after which 1 / e of the light is left [m]
+    water: wp.vec3
 
 
 @wp.struct
@@ -209,6 +213,28 @@ def floor_depth(floor: Floor, sun: Sun, d: wp.vec3):
 
 
 @wp.func
+def fade(floor: Floor, distance: float):
+    """Distance beyond where fading into the sky begins, in units of what fades one half."""
+    return wp.max(distance - floor.fade_from, 0.0) / floor.fade_over
+
+
+@wp.func
+def through_water(floor: Floor, sun: Sun, d: wp.vec3, depth: float, color: wp.vec3):
+    """Colour of what lies at a depth along the ray t d, as seen through the water's surface."""
+    fall = -wp.dot(sun.up, d)
+    if floor.wet == 0 or fall * depth <= floor.depth:
+        return color
+    length = wp.length(d)
+    t = floor.depth / fall
+    clear = 0.72 * wp.exp(-(depth - t) * length / floor.clarity)
+    seen = wp.lerp(floor.water, color, clear)
+    grazing = 1.0 - fall / length
+    mirror = 0.05 + 0.6 * grazing * grazing * grazing
+    away = fade(floor, t * length)
+    return wp.lerp(wp.lerp(seen, floor.sky, mirror), floor.sky, away * away / (1.0 + away * away))
+
+
+@wp.func
 def background(
     lens: Lens, sun: Sun, floor: Floor, sums: wp.array2d(dtype=wp.vec2i), d: wp.vec3, t: float
 ):
@@ -216,7 +242,7 @@ def background(
     length = wp.length(d)
     rise = wp.dot(sun.up, d)
     sky = wp.lerp(floor.sky, floor.zenith, wp.clamp(1.6 * rise / length, 0.0, 1.0))
-    away = wp.max(t * length - floor.fade_from, 0.0) / floor.fade_over
+    away = fade(floor, t * length)
     if away > _FADED:
         return sky
     p = d * t
@@ -311,11 +337,14 @@ def pixel_color(
             d = wp.vec3(left, top, 1.0)
             depth = depth_of(key)
             ground = floor_depth(floor, sun, d)
+            color = wp.vec3(0.0, 0.0, 0.0)
             if depth <= ground:
                 surface = int(key & _SURFACE_BITS)
-                total += count * surface_color(sun, surfaces, depths, d, depth, surface)
+                color = surface_color(sun, surfaces, depths, d, depth, surface)
             else:
-                total += count * background(lens, sun, floor, sums, d, ground)
+                depth = ground
+                color = background(lens, sun, floor, sums, d, ground)
+            total += count * through_water(floor, sun, d, depth, color)
     return total / float(SAMPLES)
 
 

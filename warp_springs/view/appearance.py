@@ -28,8 +28,8 @@ MASS = (0.012, 0.013, 0.016)
 """Colour of the spheres that stand for masses."""
 SKIN = (0.26, 0.47, 0.66)
 """Colour of the exterior triangles."""
-WATER = (0.12, 0.38, 0.60)
-"""Colour of the lines on the surface of water."""
+WATER = (0.07, 0.30, 0.44)
+"""Colour of deep water."""
 HELD = (0.45, 0.46, 0.48)
 """Colour of the spheres of masses that are fixed or held to something."""
 GROUND_LIGHT = (0.70, 0.72, 0.75)

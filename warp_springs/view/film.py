@@ -24,6 +24,8 @@ Pixels = NDArray[np.uint8]
 
 _LETTERS_PER_HEIGHT = 1 / 40
 _SMALLEST_LETTERS = 9
+_SURROUNDED = 1.5
+"""How much farther away the camera stands to show obstacles too."""
 _GUTTER = 4
 _GUTTER_COLOR = (250, 251, 252)
 _TILE_MAP = 512
@@ -88,7 +90,7 @@ class Shot:
 
     def _direct(self, back: float = 1.0) -> None:
         self._director = Director(self._actors, **self._setting)
-        self._director.stand_back(back)
+        self._director.stand_back(back * (_SURROUNDED if self._scene.obstacles else 1.0))
         self._hang_labels()
 
     def _make_room(self, cells: FloatArray | None) -> None:

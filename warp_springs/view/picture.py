@@ -167,8 +167,9 @@ def _warn_of_few_cycles(film: Film) -> None:
     """Say so if a film shows fewer cycles of the muscles than one needs to judge a gait."""
     if math.isinf(film.cycle) or len(film.times) < 2:
         return
-    shown = len(film.times) * (film.times[1] - film.times[0]) / film.cycle
-    if shown < LEAST_CYCLES * (1 - 1e-6) - 1 / len(film.times):
+    step = float(film.times[1] - film.times[0])
+    shown = len(film.times) * step / film.cycle
+    if shown + step / film.cycle < LEAST_CYCLES:
         warnings.warn(
             f"the film shows {shown:.1f} cycles of the muscles; for {LEAST_CYCLES} record "
             f"{LEAST_CYCLES * film.cycle:.3g} s",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warp_springs.robot import Robot
-from warp_springs.scene import Scene
 from warp_springs.surfaces import Box, HeightField, Plane, Sphere
 from warp_springs.view import appearance
 from warp_springs.view.camera import view_axes
@@ -18,12 +17,13 @@ from warp_springs.view.solids import grid_mesh, obstacle_mesh
 
 FloatArray = NDArray[np.float64]
 
+Obstacle = Plane | Sphere | Box | HeightField
+
 _NOWHERE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _TILES, _MOST_TILES = 12, 60
 _ARROW_SIDES = 20
 _LONGEST_ARROW = 0.55
 _SHORTEST_ARROW = 0.2
-_WATER_LINES = 13
 
 
 class Pieces:
@@ -68,9 +68,9 @@ class Pieces:
         """Say that what is added from now on need not be in the map of shadows."""
         self._casters = self._count
 
-    def drawing(self, floor: float | None, tile: float) -> Drawing:
-        """Return everything as one drawing, over a floor at a height [m] with tiles [m]."""
-        given = {"casters": self._casters, "floor": floor, "tile": tile}
+    def drawing(self, **given: float | None) -> Drawing:
+        """Return everything as one drawing; what is given are further fields of it."""
+        given["casters"] = self._casters
         for names, parts in (
             (("triangles", "triangle_color"), self._triangles),
             (("bars", "bar_radius", "bar_color"), self._bars),
@@ -84,18 +84,18 @@ class Pieces:
 
 def add_obstacles(
     pieces: Pieces,
-    scene: Scene,
+    obstacles: Iterable[Obstacle],
     around: FloatArray,
     reach: float,
     tile: float,
     sink: float,
     offset: FloatArray,
 ) -> None:
-    """Add the obstacles and the water of a scene.
+    """Add obstacles of a scene.
 
     Args:
         pieces: Where to.
-        scene: Whose.
+        obstacles: Which.
         around: Middle of the robots in their own world [m], (3,): of what has no end only this
             part is drawn.
         reach: How far around it they are drawn [m].
@@ -105,7 +105,7 @@ def add_obstacles(
         offset: How far this world is moved to its place in the picture [m], (3,).
     """
     pieces.origin = offset
-    for obstacle in scene.obstacles:
+    for obstacle in obstacles:
         if isinstance(obstacle, Sphere):
             first = pieces.points([obstacle.center])
             radius = max(obstacle.radius - sink, 1e-9)
@@ -116,8 +116,6 @@ def add_obstacles(
             _add_plane(pieces, obstacle, around, reach, tile, sink)
         elif isinstance(obstacle, HeightField):
             _add_heights(pieces, obstacle, sink)
-    if scene.water is not None:
-        _add_water(pieces, scene.water.level, around, reach)
     pieces.origin = np.zeros(3)
 
 
@@ -148,7 +146,7 @@ def add_forces(
             way = force / size * share * body.diameter
             for mass in push.masses:
                 start = positions[mass] + force / size * ball
-                _add_arrow(pieces, start, start + way, 1.4 * bar, appearance.PUSH)
+                _add_arrow(pieces, start, start + way, bar, appearance.PUSH)
     for tether in tethers:
         if tether.start <= time < tether.end:
             first = pieces.points([positions[tether.mass], np.add(tether.point, offset)])
@@ -163,7 +161,7 @@ def _add_arrow(
     way = tip - start
     length = float(np.linalg.norm(way))
     right, down, forward = view_axes(way)
-    head = min(7.0 * radius, 0.5 * length)
+    head = min(6.5 * radius, 0.5 * length)
     neck = tip - head * forward
     first = pieces.points([start, neck])
     pieces.bars([(first, first + 1)], radius, color)
@@ -209,18 +207,6 @@ def _add_tiles(pieces: Pieces, corners: NDArray, shape: tuple[int, int]) -> None
     tiles = np.add.outer(*(np.arange(n - 1) for n in shape)).ravel() % 2
     color = np.where(tiles[:, None] == 1, appearance.OBSTACLE_DARK, appearance.OBSTACLE)
     pieces.triangles(corners, np.tile(color, (2, 1)))
-
-
-def _add_water(pieces: Pieces, level: float, around: FloatArray, reach: float) -> None:
-    """Add a net of thin lines at the surface: what is below stays in sight."""
-    steps = np.linspace(-reach, reach, _WATER_LINES)
-    edge = np.full(_WATER_LINES, reach)
-    ends = [(steps, -edge), (steps, edge), (-edge, steps), (edge, steps)]
-    rows = [np.column_stack((x, y, np.zeros(_WATER_LINES))) for x, y in ends]
-    first = pieces.points(np.concatenate(rows) + np.array((*around[:2], level)))
-    here = first + np.arange(_WATER_LINES)
-    along = np.column_stack((here, here + _WATER_LINES))
-    pieces.bars(np.concatenate((along, along + 2 * _WATER_LINES)), 0.002 * reach, appearance.WATER)
 
 
 def _rows(values: ArrayLike, count: int, width: int | None = None) -> NDArray[np.float32]:

@@ -31,6 +31,7 @@ _CUDA_BAND_ROWS = 2160
 _CUDA_PARTS = 16
 _SUN_SPREAD = 0.07
 _LONGEST_REACH = 40
+_CLARITY = 5.0  # tiles of the floor after which 1 / e of the light comes through water
 
 
 def _none(*row: int) -> Callable[[], NDArray[np.float64]]:
@@ -54,6 +55,7 @@ class Drawing:
         ball_color: (K, 3).
         floor: Height of the floor; None draws none.
         tile: Edge of a tile of the floor's checker.
+        water: Height of the surface of water; None: there is none.
         casters: How many of the first points throw shadows: the sun's map covers these, the rest
             may lie outside; None: all.
     """
@@ -69,6 +71,7 @@ class Drawing:
     ball_color: NDArray[np.floating] = field(default_factory=_none(3))
     floor: float | None = 0.0
     tile: float = 0.1
+    water: float | None = None
     casters: int | None = None
 
 
@@ -300,6 +303,10 @@ def _floor(drawing: Drawing, camera: Camera) -> shading.Floor:
     floor.dark = wp.vec3(*appearance.GROUND_DARK)
     floor.sky = wp.vec3(*appearance.SKY)
     floor.zenith = wp.vec3(*appearance.ZENITH)
+    floor.wet = int(drawing.water is not None and camera.eye[2] > drawing.water)
+    floor.depth = camera.eye[2] - (drawing.water or 0.0)
+    floor.clarity = _CLARITY * drawing.tile
+    floor.water = wp.vec3(*appearance.WATER)
     return floor
 
 

@@ -7,14 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_springs.scene import Scene
+from warp_springs.surfaces import Box, Sphere
 from warp_springs.view import appearance
 from warp_springs.view.actors import Actor, FloatArray
 from warp_springs.view.look import Look
-from warp_springs.view.props import Pieces, add_forces, add_obstacles
+from warp_springs.view.props import Obstacle, Pieces, add_forces, add_obstacles
 from warp_springs.view.rasteriser import Drawing
 
-_ENDLESS = 3.0
+_ENDLESS = 8.0
 """Half the side of what is drawn of endless things, in sizes of what is shown."""
+_NEAR = 3.0
+"""How far away obstacles throw shadows, in sizes of what is shown."""
 
 
 def draw_scene(actors: Sequence[Actor], scene: Scene, look: Look, time: float) -> Drawing:
@@ -34,19 +37,22 @@ def draw_scene(actors: Sequence[Actor], scene: Scene, look: Look, time: float) -
     for actor, positions in zip(actors, poses, strict=True):
         _add_body(pieces, actor, positions, time, look)
         add_forces(pieces, actor.body, positions, actor.offset, time)
-    pieces.end_of_casters()
     sizes = [float(np.linalg.norm(a.high[0] - a.low[0])) for a in actors]
     tile = appearance.tile_size(sizes)
-    if scene.obstacles or scene.water is not None:
+    for casting in (True, False):
         for offset in _places(actors):
             there = [p for a, p in zip(actors, poses, strict=True) if (a.offset == offset).all()]
             box = np.concatenate(there)
-            low, high = box.min(axis=0), box.max(axis=0)
-            reach = max(_ENDLESS * float(np.linalg.norm(high - low)), _ENDLESS * max(sizes))
-            around = (low + high) / 2 - offset
-            add_obstacles(pieces, scene, around, reach, tile, largest, offset)
+            low, high = box.min(axis=0) - offset, box.max(axis=0) - offset
+            size = max(float(np.linalg.norm(high - low)), *sizes)
+            around = (low + high) / 2
+            chosen = [o for o in scene.obstacles if _casts(o, around, _NEAR * size) == casting]
+            add_obstacles(pieces, chosen, around, _ENDLESS * size, tile, largest, offset)
+        if casting:
+            pieces.end_of_casters()
     floor = None if scene.ground is None else -largest
-    return pieces.drawing(floor, tile)
+    water = None if scene.water is None else scene.water.level
+    return pieces.drawing(floor=floor, tile=tile, water=water)
 
 
 def _add_body(pieces: Pieces, actor: Actor, positions: FloatArray, time: float, look: Look) -> None:
@@ -60,6 +66,17 @@ def _add_body(pieces: Pieces, actor: Actor, positions: FloatArray, time: float, 
         color = np.tile(np.float32(appearance.MASS), (body.n_masses, 1))
         color[body.elements.bonds.masses] = appearance.HELD
         pieces.balls(first + np.arange(body.n_masses), actor.ball, color)
+
+
+def _casts(obstacle: Obstacle, around: FloatArray, reach: float) -> bool:
+    """Whether an obstacle throws a shadow: a sphere or a box that is near enough."""
+    if isinstance(obstacle, Sphere):
+        size = obstacle.radius
+    elif isinstance(obstacle, Box):
+        size = float(np.linalg.norm(obstacle.size)) / 2
+    else:
+        return False
+    return size < reach and float(np.linalg.norm(np.subtract(obstacle.center, around))) < reach
 
 
 def _places(actors: Sequence[Actor]) -> FloatArray:
