@@ -6,12 +6,14 @@ import sys
 
 from warp_springs.commands.demo import DemoCommand
 from warp_springs.commands.info import InfoCommand
+from warp_springs.commands.render import RenderCommand
 
 __all__ = ["COMMANDS", "main"]
 
 COMMANDS = {
     "demo": DemoCommand,
     "info": InfoCommand,
+    "render": RenderCommand,
 }
 
 
