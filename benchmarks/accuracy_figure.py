@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
+MARKERS = {"float64": "o", "float32": "^", "mixed": "s"}
 COLOURS = {"chin4": "#1f6fb2", "leapfrog": "#e08a1e", "euler": "#b5495b"}
 NAMES = {"chin4": "chin4", "leapfrog": "leapfrog", "euler": "symplectic Euler"}
 #: Where the name of a recommended step stands, in points from its ring.
@@ -115,12 +116,12 @@ def _panel(ax: Axes, rows: Sequence[Row], case: Case, truth: Truth, cost: str) -
 def _look(series: Series) -> dict:
     """How a series is drawn: integrator by colour, precision by marker, sub-steps by line."""
     colour = COLOURS[series.integrator]
-    single, one = series.precision == "float32", series.substeps == "one"
+    single, one = series.precision != "float64", series.substeps == "one"
     return {
         "color": colour,
         "linewidth": 0.9 if single or one else 1.8,
         "linestyle": (0, (1, 1.6)) if one else "-",
-        "marker": "^" if single else "o",
+        "marker": MARKERS[series.precision],
         "markersize": 3.0 if one else 5.0 if single else 4.5,
         "markerfacecolor": "white" if single else colour,
         "markeredgewidth": 0.9,
@@ -160,7 +161,9 @@ def _legend(ax: Axes, rows: Sequence[Row], columns: int) -> None:
     entries.append(
         ("float64", _look(Series("chin4", "float64", "chosen")) | gray | {"markerfacecolor": QUIET})
     )
-    entries.append(("float32", _look(Series("chin4", "float32", "chosen")) | gray))
+    entries += [
+        (single, _look(Series("chin4", single, "chosen")) | gray) for single in ("float32", "mixed")
+    ]
     one = _look(Series("chin4", "float64", "one")) | gray | {"markerfacecolor": QUIET}
     entries.append(("one contact sub-step", one))
     ring = {"marker": "o", "markersize": 10, "markerfacecolor": "none", "linestyle": "none"}

@@ -49,7 +49,7 @@ class Series:
 
     Attributes:
         integrator: ``"chin4"``, ``"leapfrog"`` or ``"euler"``.
-        precision: ``"float64"`` or ``"float32"``.
+        precision: ``"float64"``, ``"float32"`` or ``"mixed"``.
         substeps: ``"chosen"`` contact sub-steps, ``"one"``, or ``"none"`` without a contact flow.
     """
 
@@ -99,7 +99,8 @@ def series_of(case: Case) -> list[Series]:
     """The ways to step that differ in a scene."""
     contact = ("chosen", "one") if case.scene.ground else ("none",)
     ways = [(name, s) for name in ("chin4", "leapfrog") for s in contact] + [("euler", "none")]
-    return [Series(name, real, s) for real in ("float64", "float32") for name, s in ways]
+    series = [Series(name, real, s) for real in ("float64", "float32") for name, s in ways]
+    return [*series, Series("chin4", "mixed", contact[0])]
 
 
 def sweep(

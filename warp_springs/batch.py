@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_springs.kernels.buffers import BUNDLE, dtype_of
+from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
 from warp_springs.method import Method
@@ -25,8 +25,10 @@ from warp_springs.packing import (
     coefficients,
     lane_major,
     largest,
+    local_frames,
     longest_springs,
     not_finite,
+    rests,
     row_pairs,
     sort_rows,
 )
@@ -48,6 +50,10 @@ PACKED = (
     "reaches2",
     "positions",
     "velocities",
+    "low_positions",
+    "low_velocities",
+    "origins",
+    "quanta",
     "oscillators",
     "states",
 )
@@ -263,18 +269,28 @@ class Batch:
             "velocities": (fields["velocities"], strip.masses),
             "oscillators": (oscillators, one),
         }
+        real = real_dtype(method.precision)
+        if method.precision == "mixed":
+            origins, quanta, local = local_frames(strip)
+            per_robot |= {
+                "positions": (local, strip.masses),
+                "low_positions": (rests(local, real), strip.masses),
+                "low_velocities": (rests(fields["velocities"], real), strip.masses),
+                "origins": (origins, one),
+                "quanta": (quanta, one),
+            }
         # A mass too large for the precision would come out as one without an inverse.
-        invalid = largest(fields["masses"], strip.masses) > np.finfo(method.precision).max
+        invalid = largest(fields["masses"], strip.masses) > np.finfo(real).max
         for name, (values, rows) in per_robot.items():
             cast = values.astype(dtype_of(name, method.precision), copy=False)
             invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
         # A stiffness that vanishes would be divided by.
-        vanished = fields["stiffness"].astype(method.precision) == 0.0
+        vanished = fields["stiffness"].astype(real) == 0.0
         invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
         longest = longest_springs(strip)
         elastic = largest(fields["stiffness"], strip.counts) * strip.counts * longest**2
-        self.rounding[strip.ids] = np.finfo(method.precision).eps * elastic
+        self.rounding[strip.ids] = np.finfo(real).eps * elastic
         reach = np.where(longest > 0.0, method.limits.stretch * longest, np.inf)
         for name, values in {
             "reaches2": reach**2,

@@ -41,7 +41,7 @@ class Method:
         dt: Step of the run [s].
         auto: Whether a robot's step is the step of the run divided by a power of two of its own.
         integrator: ``"chin4"``, ``"leapfrog"`` or ``"euler"``.
-        precision: ``"float64"`` or ``"float32"``.
+        precision: ``"float64"``, ``"float32"`` or ``"mixed"``.
         contact_substeps: Steps of the contact flow within one drift, or ``None`` to choose them.
         limits: What stops a robot.
     """

@@ -18,8 +18,10 @@ __all__ = [
     "coefficients",
     "lane_major",
     "largest",
+    "local_frames",
     "longest_springs",
     "not_finite",
+    "rests",
     "row_pairs",
     "sort_rows",
 ]
@@ -170,6 +172,29 @@ def coefficients(
         np.multiply(kb, np.cos(c), out=table[:, 2])
         np.multiply(kb, np.sin(c), out=table[:, 3])
     return table
+
+
+def local_frames(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions about an origin near each robot, for mixed precision.
+
+    The origin is a multiple of the robot's quantum, a power of two no smaller than the robot, in
+    which the origin follows it later.
+
+    Returns:
+        Origins [m], shape (n, 3); quanta [m], (n,); and local positions [m], (total masses, 3).
+    """
+    positions, start = strip.fields["positions"], np.cumsum(strip.masses) - strip.masses
+    center = np.add.reduceat(positions, start) / strip.masses[:, None]
+    way = np.abs(positions - np.repeat(center, strip.masses, axis=0)).max(axis=1)
+    size = np.clip(2.0 * largest(np.nan_to_num(way), strip.masses), 2.0**-40, 2.0**60)
+    quanta = 2.0 ** np.ceil(np.log2(size))
+    origins = np.nan_to_num(np.rint(center / quanta[:, None]) * quanta[:, None])
+    return origins, quanta, positions - np.repeat(origins, strip.masses, axis=0)
+
+
+def rests(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """What values lose when they are rounded to ``dtype``."""
+    return values - values.astype(dtype)
 
 
 def longest_springs(strip: Strip) -> np.ndarray:

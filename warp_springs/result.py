@@ -28,7 +28,7 @@ class Result:
         robots: The N robots as they were given to the simulation.
         scene: Their world.
         dt: Step of the run [s]; with ``dt="auto"`` a robot may take shorter ones.
-        precision: ``"float64"`` or ``"float32"``.
+        precision: ``"float64"``, ``"float32"`` or ``"mixed"``.
         integrator: ``"chin4"``, ``"leapfrog"`` or ``"euler"``.
         device: Where the run took place.
         start_time: Time at the start of this run [s].

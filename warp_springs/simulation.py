@@ -13,6 +13,7 @@ import numpy as np
 from warp_springs.batch import Batch
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
+from warp_springs.kernels.buffers import dtype_of
 from warp_springs.kernels.law import EVALUATIONS
 from warp_springs.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.method import AUTO_DT, Method
@@ -36,7 +37,9 @@ class Simulation:
         dt: Step [s]; or ``"auto"``, half a millisecond, halved for each robot until it is half of
             ``ws.stable_dt`` or less, so that one stiff robot does not slow a thousand.
         device: ``"cpu"``, or a GPU: ``"cuda:0"``.
-        precision: ``"float64"``, or ``"float32"`` for about twice the speed.
+        precision: ``"float64"``; ``"float32"`` for about twice the speed, near the origin of the
+            world; or ``"mixed"``: forces in float32, positions and velocities held as sums of two
+            float32, about an origin that follows the robot, anywhere.
         integrator: ``"chin4"`` (fourth order, three evaluations of the springs a step),
             ``"leapfrog"`` (second order, one), or ``"euler"`` (symplectic Euler, the classroom's
             method). With the first two, gravity and the ground are sub-cycled in the drifts.
@@ -65,7 +68,7 @@ class Simulation:
         dt: float | Literal["auto"] = "auto",
         *,
         device: str = "cpu",
-        precision: Literal["float64", "float32"] = "float64",
+        precision: Literal["float64", "float32", "mixed"] = "float64",
         integrator: Literal["chin4", "leapfrog", "euler"] = "chin4",
         contact_substeps: int | None = None,
         threads: int | None = None,
@@ -80,7 +83,7 @@ class Simulation:
             check_choice("dt", dt, ("auto",))
         else:
             check_number("dt", dt, above=0.0)
-        check_choice("precision", precision, ("float64", "float32"))
+        check_choice("precision", precision, ("float64", "float32", "mixed"))
         check_choice("integrator", integrator, ("chin4", "leapfrog", "euler"))
         if contact_substeps is not None:
             _check_count("contact_substeps", contact_substeps)
@@ -90,6 +93,10 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
+        if precision == "mixed":
+            if layout not in ("auto", "lanes") or not place.is_cpu:
+                raise ValueError("precision: 'mixed' is for the layout 'lanes' on a CPU")
+            layout = "lanes"
         check_layout(layout, place, [robot.n_masses for robot in _bodies(self.robots)])
         self.dt, self.device, self.layout = AUTO_DT if auto else float(dt), place.alias, layout
         self.precision, self.integrator = precision, integrator
@@ -166,21 +173,26 @@ class Simulation:
 
     def _allocate(self) -> dict[str, np.ndarray]:
         """Every buffer of the kernels by name: the packed ones, and what is written."""
-        batch, real = self._batch, np.dtype(self.precision)
+        batch = self._batch
         buffers = batch.arrays | {
             "bundles": batch.bundles.ravel(),
             "constants": self._method.constants(self.scene).ravel(),
         }
-        for name in ("positions", "velocities"):
-            buffers[f"good_{name}"] = aligned([buffers[name]], real)
-            buffers[f"seen_{name}"] = aligned([buffers[name]], real)
-        lanes = len(buffers["omegas"])
-        buffers["seen_centers"] = aligned([np.zeros(3 * lanes, real)], real)
-        buffers["seen_energies"] = aligned([np.zeros(8 * lanes, real)], real)
-        buffers["ledgers"] = aligned([np.zeros(8 * lanes, real)], real)
-        buffers["seen_states"] = np.zeros(lanes, np.int32)
-        buffers["state_times"], buffers["seen_state_times"] = np.zeros(lanes), np.zeros(lanes)
+        for name in ("positions", "velocities", "low_positions", "low_velocities"):
+            buffers[f"good_{name}"] = self._buffer(f"good_{name}", buffers[name])
+        places, lanes = np.zeros(len(buffers["positions"])), len(buffers["omegas"])
+        sizes = {"seen_centers": 3, "seen_energies": 8, "ledgers": 8}
+        sizes |= dict.fromkeys(("seen_states", "state_times", "seen_state_times"), 1)
+        for name in ("seen_positions", "seen_velocities"):
+            buffers[name] = self._buffer(name, places)
+        for name, columns in sizes.items():
+            buffers[name] = self._buffer(name, np.zeros(columns * lanes))
         return buffers
+
+    def _buffer(self, name: str, values: np.ndarray) -> np.ndarray:
+        """A buffer of the kernels that begins with these values."""
+        dtype = dtype_of(name, self.precision)
+        return aligned([values.astype(dtype, copy=False)], dtype)
 
     def _check_record(self, record: Iterable[int] | None, fps: float | None) -> np.ndarray:
         count = len(self.robots)

@@ -12,7 +12,7 @@ import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.crowd import Crowd, crowds
-from warp_springs.kernels.buffers import BUNDLE, structs
+from warp_springs.kernels.buffers import BUNDLE, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 from warp_springs.packing import aligned
 
@@ -73,7 +73,7 @@ class Slice:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
         self._features = group.features
-        real = np.dtype(group.features.precision)
+        real = real_dtype(group.features.precision)
         size = scratch_size(group.features, *largest) + SCRATCH_GAP
         given = {
             "scratch": _on_device(aligned([np.zeros(size, real)], real)),

@@ -144,7 +144,11 @@ def test_a_small_run_writes_tables_json_and_figures(tmp_path, monkeypatch, capsy
     assert "Recommended steps" in told and "What holds" in told
     data = json.loads(numbers.read_text())
     assert {row["scene"] for row in data["rows"]} == {"free cube", "slide"}
-    assert {row["series"]["precision"] for row in data["rows"]} == {"float64", "float32"}
+    assert {row["series"]["precision"] for row in data["rows"]} == {
+        "float64",
+        "float32",
+        "mixed",
+    }
     orders = {c["how"]: c["measured"] for c in data["claims"] if "order" in c["about"]}
     assert orders["chin4"] == pytest.approx(4.0, abs=0.2)
     assert orders["leapfrog"] == pytest.approx(2.0, abs=0.1)

@@ -24,6 +24,8 @@ SETTINGS = [
     ("float32", "chin4"),
     ("float64", "euler"),
     ("float32", "euler"),
+    ("mixed", "chin4"),
+    ("mixed", "euler"),
 ]
 
 

@@ -16,7 +16,7 @@ class SimulationConfig(Section):
 
     dt: float | Literal["auto"] = "auto"
     """Time step [s], or "auto": for each robot half a millisecond, halved until it is stable."""
-    precision: Literal["float64", "float32"] = "float64"
+    precision: Literal["float64", "float32", "mixed"] = "float64"
     integrator: Literal["chin4", "leapfrog", "euler"] = "chin4"
     device: str = "cpu"
     threads: int | None = Field(None, ge=1)

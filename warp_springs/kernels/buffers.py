@@ -13,15 +13,19 @@ __all__ = [
     "REAL",
     "SEEN",
     "STATE",
+    "WIDE",
     "Structs",
     "array_struct",
     "dtype_of",
+    "real_dtype",
     "real_type",
     "struct_of",
     "structs",
+    "wide_dtype",
 ]
 
-REAL = "real"  # the precision of the run
+REAL = "real"  # what a run computes with
+WIDE = "wide"  # what holds a place in the world: float64 in mixed precision
 
 #: Columns of the table of bundles. Offsets count elements of the flat buffers.
 BUNDLE = (
@@ -50,6 +54,7 @@ MODEL = {
     "coefficients": REAL,  # k, h, or k, ha, hs, hc of each sorted spring: N/m, N
     "omegas": np.float64,  # rad/s
     "reaches2": REAL,  # square of the length that stops a robot, m^2
+    "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision
 }
 
 #: What stepping changes.
@@ -58,6 +63,13 @@ STATE = {
     "velocities": REAL,  # m/s
     "good_positions": REAL,  # at the last check that found the robot healthy
     "good_velocities": REAL,
+    # What a single number does not hold of them, and the origins of the positions, three a lane;
+    # empty but in mixed precision.
+    "low_positions": REAL,
+    "low_velocities": REAL,
+    "good_low_positions": REAL,
+    "good_low_velocities": REAL,
+    "origins": np.float64,  # m
     "oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt): four a lane
     "states": np.int32,  # Status
     "state_times": np.float64,  # when it was found, s
@@ -66,9 +78,9 @@ STATE = {
 
 #: What looking writes.
 SEEN = {
-    "seen_positions": REAL,
-    "seen_velocities": REAL,  # synchronised with the positions
-    "seen_centers": REAL,  # centre of mass: three a lane
+    "seen_positions": WIDE,
+    "seen_velocities": WIDE,  # synchronised with the positions
+    "seen_centers": WIDE,  # centre of mass: three a lane
     "seen_energies": REAL,  # kinetic, gravity, spring, ground, and the ledger: eight a lane, J
     "seen_states": np.int32,
     "seen_state_times": np.float64,
@@ -83,15 +95,27 @@ class Structs(NamedTuple):
     seen: type
 
 
+def real_dtype(precision: str) -> np.dtype:
+    """What a run of a precision computes with."""
+    return np.dtype("float64" if precision == "float64" else "float32")
+
+
+def wide_dtype(precision: str) -> np.dtype:
+    """What holds a place in the world."""
+    return np.dtype("float32" if precision == "float32" else "float64")
+
+
 def dtype_of(name: str, precision: str) -> np.dtype:
     """Element type of a buffer."""
     kind = (MODEL | STATE | SEEN)[name]
-    return np.dtype(precision if kind is REAL else kind)
+    if kind is REAL:
+        return real_dtype(precision)
+    return wide_dtype(precision) if kind is WIDE else np.dtype(kind)
 
 
 def real_type(precision: str) -> type:
     """The Warp type of a number of the run."""
-    return wp.dtype_from_numpy(np.dtype(precision))
+    return wp.dtype_from_numpy(real_dtype(precision))
 
 
 @functools.cache

@@ -64,14 +64,30 @@ def preamble(features: Features) -> str:
     lines += [f"const scalar {name} = scalar(run[{i}]);" for i, name in enumerate(CONSTANTS)]
     lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
     dialect = vector_dialect(features.precision, features.width) + feature_flags(features)
-    return dialect + "\n".join(lines) + LAW + _BUNDLE
+    return dialect + "\n".join(lines) + _ORIGIN + LAW + _BUNDLE
 
+
+# The origin of the positions of each lane, as the law sees it.
+_ORIGIN = r"""
+real origins_here[3] = {};
+real* const origin = origins_here;
+double* const origins = state.origins.data + 3 * lane_;
+auto look_up_origin = [=]() {
+    for (int c = 0; MIXED && c < 3; ++c)
+        for (int l = 0; l < W; ++l) origin[c][l] = scalar(origins[c * W + l]);
+};
+look_up_origin();
+"""
 
 # What both kernels need: the blocks of one bundle, one row of springs, its health.
 _BUNDLE = r"""
 const int M = (int)masses_, S = (int)springs_, substeps = (int)substeps_;
 Vec* const x = (Vec*)(state.positions.data + state_);
 Vec* const v = (Vec*)(state.velocities.data + state_);
+Vec* const low_x = (Vec*)(state.low_positions.data + state_);  // in mixed precision
+Vec* const low_v = (Vec*)(state.low_velocities.data + state_);
+Vec* const good_low_x = (Vec*)(state.good_low_positions.data + state_);
+Vec* const good_low_v = (Vec*)(state.good_low_velocities.data + state_);
 Vec* const good_x = (Vec*)(state.good_positions.data + state_);
 Vec* const good_v = (Vec*)(state.good_velocities.data + state_);
 const real* const w = (const real*)(model.inverse_masses.data + mass_);
@@ -138,7 +154,7 @@ auto diagnose = [=]() -> mask {
         const Vec a = x[i], u = v[i];
         poison += poison_of(a, u);
         fast |= too_fast(u, a - good_x[i]);
-        if (GROUND) deep |= a.z < -depth_limit;
+        if (GROUND) deep |= in_world(sum_of(x, low_x, i)).z < -depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
             stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
@@ -159,6 +175,36 @@ auto all_stopped = [=]() -> bool { return !any(~stopped_lanes()); };
 """
 
 CONTROL = r"""
+// The origin follows a robot whose centre has left it by more than a quantum, in whole quanta. What
+// a shifted position cannot hold goes to its low part.
+auto follow = [&]() {
+    Vec center = {};
+    for (int i = 0; i < M; ++i) center = center + x[i];
+    const real quantum = *(const real*)(model.quanta.data + lane_);
+    const mask goes_on = ~stopped_lanes();
+    auto way = [=](real sum) -> real {
+        const real middle = sum / (zero + scalar(M));
+        const mask away = __builtin_elementwise_abs(middle) > quantum;
+        return select(away & goes_on, __builtin_elementwise_rint(middle / quantum) * quantum, zero);
+    };
+    const real shift[3] = {way(center.x), way(center.y), way(center.z)};
+    if (!any((shift[0] != zero) | (shift[1] != zero) | (shift[2] != zero))) return;
+    auto less = [](real& a, real& low, real by) {
+        const real sum = a - by, part = sum - a;
+        const real rest = low + ((a - (sum - part)) - (by + part));
+        a = sum + rest;
+        low = rest - (a - sum);
+    };
+    for (int i = 0; i < M; ++i) {
+        less(x[i].x, low_x[i].x, shift[0]);
+        less(x[i].y, low_x[i].y, shift[1]);
+        less(x[i].z, low_x[i].z, shift[2]);
+        good_x[i] = x[i]; good_low_x[i] = low_x[i];
+    }
+    for (int c = 0; c < 3; ++c)
+        for (int l = 0; l < W; ++l) origins[c * W + l] += double(shift[c][l]);
+    look_up_origin();
+};
 // Stops the robots that went wrong since the last check where they were last good.
 auto check = [&](long long n) {
     mask stopped = stopped_lanes();
@@ -174,11 +220,19 @@ auto check = [&](long long n) {
     auto restore = [&](real& now, real& good) __attribute__((always_inline)) {
         now = good = select(stopped, good, now);
     };
+    auto restore_vec = [&](Vec& now, Vec& good) __attribute__((always_inline)) {
+        restore(now.x, good.x); restore(now.y, good.y); restore(now.z, good.z);
+    };
     for (int i = 0; i < M; ++i) {
-        restore(x[i].x, good_x[i].x); restore(x[i].y, good_x[i].y); restore(x[i].z, good_x[i].z);
-        restore(v[i].x, good_v[i].x); restore(v[i].y, good_v[i].y); restore(v[i].z, good_v[i].z);
+        restore_vec(x[i], good_x[i]);
+        restore_vec(v[i], good_v[i]);
+        if (MIXED) {
+            restore_vec(low_x[i], good_low_x[i]);
+            restore_vec(low_v[i], good_low_v[i]);
+        }
     }
     for (int e = 0; LEDGER && e < 4; ++e) restore(ledger[e], good_ledger[e]);
+    if (MIXED) follow();
 };
 auto set_oscillators = [&](long long n) {
     for (int l = 0; l < W; ++l) {
@@ -231,9 +285,9 @@ end();
 """
 
 OBSERVE = r"""
-Vec* const seen_x = (Vec*)(seen.seen_positions.data + state_);
-Vec* const seen_v = (Vec*)(seen.seen_velocities.data + state_);
-real* const com = (real*)(seen.seen_centers.data + 3 * lane_);
+wide* const seen_x = (wide*)(seen.seen_positions.data + state_);
+wide* const seen_v = (wide*)(seen.seen_velocities.data + state_);
+wide* const com = (wide*)(seen.seen_centers.data + 3 * lane_);
 real* const energy = (real*)(seen.seen_energies.data + 8 * lane_);
 
 const mask before = stopped_lanes();
@@ -244,38 +298,59 @@ for (int l = 0; l < W; ++l) {
     seen.seen_states.data[lane_ + l] = health[l] != 0 ? health[l] : (int)reason[l];
     seen.seen_state_times.data[lane_ + l] = health[l] != 0 ? health_time[l] : now;
 }
-auto choose = [=](Vec good, Vec now) -> Vec {
+auto choose_part = [=](Vec good, Vec now) -> Vec {
     return Vec{select(stopped, good.x, now.x), select(stopped, good.y, now.y),
                select(stopped, good.z, now.z)};
 };
+auto widen = [](real a) -> wide { return __builtin_convertvector(a, wide); };
+#if MIXED
+auto choose = [=](const Sum& good, const Sum& now) -> Sum {
+    return Sum{choose_part(good, now), choose_part(good.low, now.low)};
+};
+auto show = [=](wide* out, const Sum& a, const double* from) {
+    wide at[3] = {};
+    for (int c = 0; from && c < 3; ++c) __builtin_memcpy(&at[c], from + c * W, sizeof(wide));
+    out[0] = at[0] + (widen(a.x) + widen(a.low.x));
+    out[1] = at[1] + (widen(a.y) + widen(a.low.y));
+    out[2] = at[2] + (widen(a.z) + widen(a.low.z));
+};
+#else
+auto choose = choose_part;
+auto show = [=](wide* out, Vec a, const double*) { out[0] = a.x; out[1] = a.y; out[2] = a.z; };
+#endif
 
-real total_mass = zero, cx = zero, cy = zero, cz = zero, kinetic = zero, gravity = zero,
-     springs = zero, ground = zero;
+real kinetic = zero, gravity = zero, springs = zero, ground = zero;
+wide total_mass = {}, center[3] = {};
+Vec* const seen_here = shifted_x;
 real accounts[4];
 for (int e = 0; LEDGER && e < 4; ++e) accounts[e] = ledger[e];
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
 for (int i = 0; i < M; ++i) {
     const Vec f = row_force(x, i, sine, cosine);
-    Vec u = v[i];
+    const Sum here = sum_of(x, low_x, i);
+    Sum u = sum_of(v, low_v, i);
     Losses losses = {};
-    if (!EULER && step > 0) synchronise(u, f, w[i], x[i].z, losses);
+    if (!EULER && step > 0) synchronise(u, f, w[i], in_world(here).z, losses);
     enter(ledger, losses, v[i], u, w[i]);
-    const Vec a = seen_x[i] = choose(good_x[i], x[i]);
-    u = seen_v[i] = choose(good_v[i], u);
+    const Sum a = choose(sum_of(good_x, good_low_x, i), here);
+    u = choose(sum_of(good_v, good_low_v, i), u);
+    seen_here[i] = a;
+    show(seen_x + 3 * i, a, origins);
+    show(seen_v + 3 * i, u, nullptr);
     const real m = (zero + scalar(1)) / w[i];
-    total_mass += m;
-    cx += m * a.x; cy += m * a.y; cz += m * a.z;
+    total_mass += widen(m);
+    for (int c = 0; c < 3; ++c) center[c] += widen(m) * seen_x[3 * i + c];
     kinetic += kinetic_energy(u, m);
-    gravity += gravity_energy(a, m);
-    if (GROUND) ground += ground_energy(a.z);
+    gravity += gravity_energy(in_world(a), m);
+    if (GROUND) ground += ground_energy(in_world(a).z);
 }
-com[0] = cx / total_mass; com[1] = cy / total_mass; com[2] = cz / total_mass;
+for (int c = 0; c < 3; ++c) com[c] = center[c] / total_mass;
 if (LEDGER) {
     if (ACTUATED && !EULER && step > 0) ledger[0] += power * FIRST_KICK;
     for (int i = 0; i < M; ++i) {
-        const Vec a = seen_x[i];
+        const Vec a = seen_here[i];
         for (int s = row[i]; s < row[i + 1]; ++s) {
-            const Vec b = seen_x[partner[s]];
+            const Vec b = seen_here[partner[s]];
             springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z),
                                      stiffness(s), half_rest_force(s, sine, cosine));
         }

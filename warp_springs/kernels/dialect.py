@@ -8,6 +8,8 @@ import functools
 
 import warp as wp
 
+from warp_springs.kernels.buffers import real_dtype, wide_dtype
+
 __all__ = ["native_width", "quad_operations", "scalar_dialect", "vector_dialect"]
 
 
@@ -36,7 +38,7 @@ def native_width(precision: str) -> int:
     """Lanes of one vector register, as Warp's compiler targets this processor."""
     size = wp.zeros(1, dtype=wp.int32, device="cpu")
     wp.launch(_measure, 1, outputs=[size], device="cpu")
-    return int(size.numpy()[0]) // (4 if precision == "float32" else 8)
+    return int(size.numpy()[0]) // real_dtype(precision).itemsize
 
 
 # Bytes of a scalar, the integer of its size, TINY, and the processor's estimate of 1 / sqrt(a):
@@ -57,13 +59,19 @@ _SERIES = {
 
 def vector_dialect(precision: str, width: int) -> str:
     """C++ text that defines the names ``kernels.law`` asks a dialect for."""
-    scalar, integer, size, tiny, estimate, whole, bits = _TYPES[precision]
+    name = real_dtype(precision).name
+    scalar, integer, size, tiny, estimate, whole, bits = _TYPES[name]
+    wide = wide_dtype(precision).itemsize * width
     return f"""
+    #undef MIXED
+    #define MIXED {int(precision == "mixed")}
     #pragma clang fp contract(on)
     typedef {scalar} scalar;
     typedef {integer} integer;
     typedef scalar real __attribute__((vector_size({size * width})));
     typedef integer mask __attribute__((vector_size({size * width})));
+    typedef {"float" if wide == 4 * width else "double"} wide_scalar;
+    typedef wide_scalar wide __attribute__((vector_size({wide}), aligned({min(wide, 64)})));
     const int W = {width};
     const scalar TINY = {tiny};
     const real zero = {{}};
@@ -88,7 +96,7 @@ def vector_dialect(precision: str, width: int) -> str:
             }}
         }}
         const real e = scalar(1) - (a * y) * y;
-        return {_SERIES[precision]};
+        return {_SERIES[name]};
     #else
         return (h + h) / __builtin_elementwise_sqrt(a);
     #endif
@@ -100,6 +108,8 @@ def scalar_dialect(precision: str) -> str:
     """The same names for one number, on a GPU or a CPU."""
     scalar, _, _, tiny, *_ = _TYPES[precision]
     return f"""
+    #undef MIXED
+    #define MIXED 0
     typedef {scalar} scalar;
     typedef scalar real;
     typedef bool mask;

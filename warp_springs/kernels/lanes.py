@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import warp as wp
 
-from warp_springs.kernels.buffers import structs
+from warp_springs.kernels.buffers import real_type, structs
 from warp_springs.kernels.bundle import CONTROL, OBSERVE, STEPS, Features, preamble
 from warp_springs.kernels.strands import strand_passes, strand_scratch
 
@@ -108,23 +108,25 @@ auto enter_work = [&](scalar time) __attribute__((always_inline)) {
 auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
     sweep(shifted ? shifted_x : x, [&](int i, Vec f) __attribute__((always_inline)) {
-        Vec a = x[i], u = v[i];
+        Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         real rest = CHIN4 && last ? left_over[i] : zero;
         move_mass(a, u, f, w[i], substeps, rest, time, start, last, ledger);
         if (CHIN4 && !last) left_over[i] = rest;
-        x[i] = a; v[i] = u;
+        keep_sum(x, low_x, i, a);
+        keep_sum(v, low_v, i, u);
     });
 };
 auto gradient_shift = [&]() __attribute__((always_inline)) {
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
-        shifted_x[i] = shifted_position(x[i], f, w[i]);
+        shifted_x[i] = shifted_position(sum_of(x, low_x, i), f, w[i]);
     });
 };
 auto euler = [&]() __attribute__((always_inline)) {
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
-        Vec a = x[i], u = v[i];
+        Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         move_mass_euler(a, u, f, w[i], ledger);
-        x[i] = a; v[i] = u;
+        keep_sum(x, low_x, i, a);
+        keep_sum(v, low_v, i, u);
     });
 };
 
@@ -139,7 +141,7 @@ _NO_LEDGER = "auto enter_work = [](scalar) {};"
 @functools.cache
 def kernels(features: Features) -> Kernels:
     """Kernels specialised on features; the first use of a specialisation compiles it (seconds)."""
-    real = wp.float32 if features.precision == "float32" else wp.float64
+    real = real_type(features.precision)
     Model, State, Seen = structs(features.precision)
     common = preamble(features)
     # A named module of its own: compiling one specialisation leaves the others alone.

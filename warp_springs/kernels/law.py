@@ -10,6 +10,8 @@ A layout puts in front of ``LAW`` a dialect that defines
 ``any(m)``                true if any lane of ``m`` is
 ``square_root(a)``        IEEE square root
 ``over_root(h, a)``       2 h / sqrt(a) to the last bit or two, for a >= TINY
+``MIXED``                 a macro, 0 or 1: whether positions and velocities are sums of two numbers,
+                          the positions about ``origin[3]``, pointed to, of type ``real``
 ========================  ======================================================================
 
 and the constants of ``CONSTANTS`` as ``const scalar``, the compile-time ``const bool`` of the
@@ -29,7 +31,7 @@ __all__ = ["CONSTANTS", "DRIFTS", "EVALUATIONS", "LAW", "constants"]
 CONSTANTS = (
     "dt",  # step [s]
     "span",  # one drift [s]
-    "decay",  # exp(-damping span / 2): damping over half a drift
+    "loss",  # 1 - exp(-damping span / 2): what damping takes over half a drift
     "gravity_x",  # [m/s^2]
     "gravity_y",
     "gravity_z",
@@ -54,7 +56,7 @@ def constants(scene, dt: float, integrator: str, limits) -> list[float]:
     return [
         dt,
         span,
-        math.exp(-0.5 * scene.damping * span),
+        -math.expm1(-0.5 * scene.damping * span),
         *scene.gravity,
         ground.stiffness if ground else 0.0,
         ground.static_friction if ground else 0.0,
@@ -70,6 +72,64 @@ struct Vec {
     real x, y, z;
     Vec operator+(const Vec& b) const { return Vec{x + b.x, y + b.y, z + b.z}; }
     Vec operator-(const Vec& b) const { return Vec{x - b.x, y - b.y, z - b.z}; }
+};
+
+// A position or a velocity that grows by many small steps. In mixed precision `low` holds what a
+// single number does not, so that nothing is lost (Fast2Sum: exact where the step is no larger than
+// the sum).
+#if MIXED
+struct Sum : Vec { Vec low; };
+auto grow = [](real& a, real& low, real by) __attribute__((always_inline)) {
+    const real change = by + low, sum = a + change;
+    low = change - (sum - a);
+    a = sum;
+};
+auto sum_of = [](const Vec* a, const Vec* low, int i) __attribute__((always_inline)) -> Sum {
+    return Sum{a[i], low[i]};
+};
+auto keep_sum = [](Vec* a, Vec* low, int i, const Sum& sum) __attribute__((always_inline)) {
+    a[i] = sum; low[i] = sum.low;
+};
+// Where a mass is in the world; its height is exact near the ground.
+auto in_world = [=](const Sum& x) __attribute__((always_inline)) -> Vec {
+    return Vec{x.x + origin[0], x.y + origin[1], (x.z + origin[2]) + x.low.z};
+};
+#else
+typedef Vec Sum;
+auto sum_of = [](const Vec* a, const Vec*, int i) __attribute__((always_inline)) -> Sum {
+    return a[i];
+};
+auto keep_sum = [](Vec* a, Vec*, int i, const Sum& sum) __attribute__((always_inline)) {
+    a[i] = sum;
+};
+auto in_world = [](const Sum& x) __attribute__((always_inline)) -> Vec { return x; };
+#endif
+// Adds to the horizontal components, or to the vertical one, a rate times a time.
+auto add_level = [=](Sum& sum, Vec rate, scalar time) __attribute__((always_inline)) {
+#if MIXED
+    grow(sum.x, sum.low.x, rate.x * time);
+    grow(sum.y, sum.low.y, rate.y * time);
+#else
+    sum.x += rate.x * time; sum.y += rate.y * time;
+#endif
+};
+auto add_upright = [=](Sum& sum, real rate, scalar time) __attribute__((always_inline)) {
+#if MIXED
+    grow(sum.z, sum.low.z, rate * time);
+#else
+    sum.z += rate * time;
+#endif
+};
+auto add = [=](Sum& sum, Vec rate, scalar time) __attribute__((always_inline)) {
+    add_level(sum, rate, time);
+    add_upright(sum, rate.z, time);
+};
+// A velocity that was stopped leaves nothing over.
+auto settle_rest = [=](Sum& v) __attribute__((always_inline)) {
+#if MIXED
+    v.low.x = select(v.x == zero, zero, v.low.x);
+    v.low.y = select(v.y == zero, zero, v.low.y);
+#endif
 };
 
 // What damping, drag and friction took from a velocity between two drifts.
@@ -183,10 +243,10 @@ auto kick_acceleration = [=](Vec f, real w) __attribute__((always_inline)) -> Ve
     return Vec{f.x * w + gravity_x, f.y * w + gravity_y,
                GROUND ? f.z * w : f.z * w + gravity_z};
 };
-auto damp = [=](Vec& v, Losses& losses) __attribute__((always_inline)) {
+auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inline)) {
     if (!DAMPING) return;
     const Vec before = v;
-    v.x *= decay; v.y *= decay; v.z *= decay;
+    add(v, before, -part);
     if (LEDGER) losses.damping = losses.damping + (before - v);
 };
 auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__((always_inline)) {
@@ -195,31 +255,34 @@ auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__(
     drag_flow(v, w, time);
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
-auto rub = [=](Vec& v, real hold, real impulse, Losses& losses, scalar kinetic)
+auto rub = [=](Sum& v, real hold, real impulse, Losses& losses, scalar kinetic)
         __attribute__((always_inline)) {
     if (!COULOMB) return;
     const Vec before = v;
     coulomb(v.x, v.y, hold, impulse, kinetic);
+    settle_rest(v);
     if (LEDGER) losses.friction = losses.friction + (before - v);
 };
 // The classroom's friction belongs to the kick, since it works on the force.
-auto kick = [=](Vec& v, Vec f, real w, real z, scalar time, Losses& losses)
+auto kick = [=](Sum& v, Vec f, real w, real z, scalar time, Losses& losses)
         __attribute__((always_inline)) {
     Vec a = kick_acceleration(f, w);
-    const Vec free = {v.x + a.x * time, v.y + a.y * time, v.z + a.z * time};
+    Sum free = v;
     if (GROUND && COURSE) {
         course_friction(a.x, a.y, v.x, v.y, ground_force(z) * w);
-        v.x += a.x * time; v.y += a.y * time; v.z += a.z * time;
-        if (LEDGER) losses.friction = losses.friction + (free - v);
-    } else v = free;
+        settle_rest(v);
+        if (LEDGER) add(free, kick_acceleration(f, w), time);
+    }
+    add(v, a, time);
+    if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
 };
-auto lose_before = [=](Vec& v, real w, Losses& losses) __attribute__((always_inline)) {
-    damp(v, losses);
+auto lose_before = [=](Sum& v, real w, Losses& losses) __attribute__((always_inline)) {
+    damp(v, loss, losses);
     slow_down(v, w, span * scalar(0.5), losses);
 };
-auto lose_after = [=](Vec& v, real w, Losses& losses) __attribute__((always_inline)) {
+auto lose_after = [=](Sum& v, real w, Losses& losses) __attribute__((always_inline)) {
     slow_down(v, w, span * scalar(0.5), losses);
-    damp(v, losses);
+    damp(v, loss, losses);
 };
 
 // A mass in free flight follows its parabola; where the parabola's ends are not both above the
@@ -227,16 +290,22 @@ auto lose_after = [=](Vec& v, real w, Losses& losses) __attribute__((always_inli
 // so that a mass that sticks does not move at all. What slides is slowed by the drift's own
 // impulse. What sticks is held in proportion to the kick before the drift: the first drift of a
 // chin4 step, after a third of the step's kicks, leaves a third of its hold to the second.
-auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, real& left_over,
-                      bool last, Losses& losses) __attribute__((always_inline)) {
-    z = x.z + (v.z + gravity_z * span * scalar(0.5)) * span;
-    u = v.z + gravity_z * span;
-    const mask touching = (x.z < zero) | (z < zero);
+auto touch_down = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
+                      Losses& losses) __attribute__((always_inline)) {
+    const real height = in_world(x).z, u = v.z;
+    const real mean = u + gravity_z * span * scalar(0.5), z = height + mean * span;
+    add_upright(v, zero + gravity_z, span);
+    const mask touching = (height < zero) | (z < zero);
     if (any(touching)) {
-        real z_contact = x.z, u_contact = v.z;
+        real z_contact = height, u_contact = u;
         real impulse = contact_flow(z_contact, u_contact, w, substeps);
-        z = select(touching, z_contact, z);
-        u = select(touching, u_contact, u);
+        v.z = select(touching, u_contact, v.z);
+#if MIXED
+        v.low.z = select(touching, zero, v.low.z);
+        grow(x.z, x.low.z, select(touching, z_contact - height, mean * span));
+#else
+        x.z = select(touching, z_contact, z);
+#endif
         impulse = select(touching, impulse, zero);
         real hold = impulse;
         if (CHIN4) {
@@ -245,28 +314,30 @@ auto touch_down = [=](Vec x, Vec& v, real& z, real& u, real w, int substeps, rea
             hold = select(impulse > zero, hold, zero);
         }
         rub(v, hold, impulse, losses, kinetic_friction);
-    } else if (CHIN4) left_over = zero;
+    } else {
+        if (CHIN4) left_over = zero;
+        add_upright(x, mean, span);
+    }
 };
 // Friction slows a sliding mass evenly during the drift, which therefore moves it with the mean of
 // the velocities before and after: second order.
-auto drift = [=](Vec& x, Vec& v, real w, int substeps, real& left_over, bool last,
+auto drift = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
                  Losses& losses) __attribute__((always_inline)) {
-    real z = x.z + v.z * span, u = v.z;
     Vec mean = v;
-    if (GROUND) touch_down(x, v, z, u, w, substeps, left_over, last, losses);
+    if (GROUND) touch_down(x, v, w, substeps, left_over, last, losses);
+    else add_upright(x, v.z, span);
     if (COULOMB) {
         const mask slides = (v.x != zero) | (v.y != zero);
         mean.x = select(slides, (mean.x + v.x) * scalar(0.5), zero);
         mean.y = select(slides, (mean.y + v.y) * scalar(0.5), zero);
     }
-    x.x += mean.x * span; x.y += mean.y * span; x.z = z;
-    v.z = u;
+    add_level(x, mean, span);
 };
 
 // The velocity at t_n, from the state before its kicks: what the last part of them adds. The state
 // has had its friction up to t_n; here friction only holds what sticks, so that it is reported at
 // rest.
-auto synchronise = [=](Vec& v, Vec f, real w, real z, Losses& losses)
+auto synchronise = [=](Sum& v, Vec f, real w, real z, Losses& losses)
         __attribute__((always_inline)) {
     lose_before(v, w, losses);
     kick(v, f, w, z, FIRST_KICK, losses);
@@ -283,21 +354,22 @@ auto loss_work = [=](Vec lost, Vec before, Vec after, real w)
 };
 
 // Symplectic Euler, the classroom's method: all forces at t_n, then velocity, then position.
-auto euler_step = [=](Vec& x, Vec& v, Vec f, real w, Losses& losses)
+auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, Losses& losses)
         __attribute__((always_inline)) {
-    const real push = GROUND ? ground_force(x.z) * w : zero;
+    const real push = GROUND ? ground_force(in_world(x).z) * w : zero;
     Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, f.z * w + gravity_z + push};
-    const Vec free = {v.x + a.x * dt, v.y + a.y * dt, v.z + a.z * dt};
+    Sum free = v;
     if (GROUND && COURSE) {
+        if (LEDGER) add(free, a, dt);
         course_friction(a.x, a.y, v.x, v.y, push);
-        v.x += a.x * dt; v.y += a.y * dt; v.z += a.z * dt;
-        if (LEDGER) losses.friction = losses.friction + (free - v);
-    } else v = free;
+        settle_rest(v);
+    }
+    add(v, a, dt);
+    if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
     if (GROUND) rub(v, push * dt, push * dt, losses, kinetic_friction);
-    damp(v, losses);
-    damp(v, losses);
+    damp(v, loss * (scalar(2) - loss), losses);
     slow_down(v, w, dt, losses);
-    x.x += v.x * dt; x.y += v.y * dt; x.z += v.z * dt;
+    add(x, v, dt);
 };
 
 // The accounts of the ledger [J]: work of the breathing springs, and what damping, drag and
@@ -324,18 +396,18 @@ auto enter_step = [=](real* ledger, const Losses& losses, const Losses& rubbed, 
 
 // One mass moved by its whole force f: a kick of `time` seconds and the drift after it. `start`:
 // nothing came before; `last`: the last drift of the step; `left_over`: see touch_down.
-auto move_mass = [=](Vec& x, Vec& v, Vec f, real w, int substeps, real& left_over, scalar time,
+auto move_mass = [=](Sum& x, Sum& v, Vec f, real w, int substeps, real& left_over, scalar time,
                      bool start, bool last, real* ledger) __attribute__((always_inline)) {
     const Vec before = v;
     Losses losses = {}, rubbed = {};
     if (!start) lose_before(v, w, losses);
-    kick(v, f, w, x.z, time, losses);
+    kick(v, f, w, in_world(x).z, time, losses);
     lose_after(v, w, losses);
     const Vec kicked = v;
     drift(x, v, w, substeps, left_over, last, rubbed);
     enter_step(ledger, losses, rubbed, before, kicked, Vec{v.x, v.y, kicked.z}, w);
 };
-auto move_mass_euler = [=](Vec& x, Vec& v, Vec f, real w, real* ledger)
+auto move_mass_euler = [=](Sum& x, Sum& v, Vec f, real w, real* ledger)
         __attribute__((always_inline)) {
     const Vec before = v;
     Losses losses = {};
@@ -343,9 +415,9 @@ auto move_mass_euler = [=](Vec& x, Vec& v, Vec f, real w, real* ledger)
     enter(ledger, losses, before, v, w);
 };
 // Where the gradient kick of chin4 looks.
-auto shifted_position = [=](Vec x, Vec f, real w) __attribute__((always_inline)) -> Vec {
-    const Vec a = kick_acceleration(f, w);
-    return Vec{x.x + a.x * GRADIENT_SHIFT, x.y + a.y * GRADIENT_SHIFT, x.z + a.z * GRADIENT_SHIFT};
+auto shifted_position = [=](Sum x, Vec f, real w) __attribute__((always_inline)) -> Vec {
+    add(x, kick_acceleration(f, w), GRADIENT_SHIFT);
+    return x;
 };
 
 // Health of a mass. Who was shot away and braked since the last check shows by the way it went.

@@ -25,7 +25,7 @@ def strand_scratch(precision: str, masses: int, springs: int) -> int:
     """Scratch values that the largest robot of a slice needs."""
     width = strand_width(precision)
     masses, springs = masses + width, springs + 2 * width
-    values = 17 * masses + 8 * springs
+    values = (25 if precision == "mixed" else 17) * masses + 8 * springs
     indices = 2 * masses + 9 * springs  # no larger than a value each
     return values + indices
 
@@ -37,6 +37,7 @@ def strand_passes(precision: str) -> str:
     return f"""
 auto pass = [&](int job, scalar time, bool start, bool last) {{
     {vector_dialect(precision, width)}
+    {_ORIGIN}
     {LAW}
     {quad_operations(width)}
     {_PASS}
@@ -44,6 +45,11 @@ auto pass = [&](int job, scalar time, bool start, bool last) {{
 {_JOBS}
 """
 
+
+_ORIGIN = r"""
+real origins_here[3] = {zero + origin[0][0], zero + origin[1][0], zero + origin[2][0]};
+real* const origin = origins_here;
+"""
 
 _JOBS = r"""
 auto prepare = [&]() { pass(6, scalar(0), false, false); };
@@ -63,7 +69,9 @@ quad* const X = (quad*)scratch.data;
 quad* const V = X + MP;
 quad* const FQ = V + MP;
 quad* const shifted_x = FQ + MP;
-real* const left = (real*)(shifted_x + MP);
+quad* const low_X = shifted_x + MP;  // in mixed precision
+quad* const low_V = low_X + (MIXED ? MP : 0);
+real* const left = (real*)(low_V + (MIXED ? MP : 0));
 quad* const D = (quad*)((scalar*)left + MP);
 real* const P = (real*)(D + SP + W);
 const int coefficients = ACTUATED ? 4 : 2;
@@ -121,6 +129,10 @@ if (job == 0) {
         const bool full = i < M;
         X[i] = full ? quad{x[i].x[0], x[i].y[0], x[i].z[0], w[i][0]} : quad{0, 0, 1000000, 0};
         V[i] = full ? quad{v[i].x[0], v[i].y[0], v[i].z[0], 0} : quad{};
+        if (MIXED) {
+            low_X[i] = full ? quad{low_x[i].x[0], low_x[i].y[0], low_x[i].z[0], 0} : quad{};
+            low_V[i] = full ? quad{low_v[i].x[0], low_v[i].y[0], low_v[i].z[0], 0} : quad{};
+        }
     }
     return;
 }
@@ -128,6 +140,10 @@ if (job == 1) {
     for (int i = 0; i < M; ++i) {
         x[i].x[0] = X[i][0]; x[i].y[0] = X[i][1]; x[i].z[0] = X[i][2];
         v[i].x[0] = V[i][0]; v[i].y[0] = V[i][1]; v[i].z[0] = V[i][2];
+        if (MIXED) {
+            low_x[i].x[0] = low_X[i][0]; low_x[i].y[0] = low_X[i][1]; low_x[i].z[0] = low_X[i][2];
+            low_v[i].x[0] = low_V[i][0]; low_v[i].y[0] = low_V[i][1]; low_v[i].z[0] = low_V[i][2];
+        }
     }
     return;
 }
@@ -156,32 +172,41 @@ for (int g = 0; g < G; ++g) {
     }
     FQ[4 * g] = f0; FQ[4 * g + 1] = f1; FQ[4 * g + 2] = f2; FQ[4 * g + 3] = f3;
 }
+// W masses side by side, and back into quads.
+auto load = [=](const quad* from, real& pad) __attribute__((always_inline)) -> Vec {
+    const real* const q = (const real*)from;
+    Vec a = {q[0], q[1], q[2]};
+    pad = q[3];
+    transpose(a.x, a.y, a.z, pad);
+    return a;
+};
+auto keep = [=](quad* to, Vec a, real pad) __attribute__((always_inline)) {
+    real* const q = (real*)to;
+    transpose(a.x, a.y, a.z, pad);
+    q[0] = a.x; q[1] = a.y; q[2] = a.z; q[3] = pad;
+};
 for (int i = 0; i < MP; i += W) {
-    real* const xs = (real*)(X + i);
-    real* const vs = (real*)(V + i);
-    const real* const fs = (real*)(FQ + i);
-    Vec a = {xs[0], xs[1], xs[2]}, u = {vs[0], vs[1], vs[2]}, f = {fs[0], fs[1], fs[2]};
-    real iw = xs[3], vpad = vs[3], fpad = fs[3];
-    transpose(a.x, a.y, a.z, iw);
-    transpose(f.x, f.y, f.z, fpad);
+    real iw, pad;
+    const Vec f = load(FQ + i, pad), x_here = load(X + i, iw);
+    const Vec low_x_here = MIXED ? load(low_X + i, pad) : Vec{};
+    Sum a = sum_of(&x_here, &low_x_here, 0);
     if (job == 4) {
-        a = shifted_position(a, f, iw);
-        transpose(a.x, a.y, a.z, iw);
-        real* const ys = (real*)(shifted_x + i);
-        ys[0] = a.x; ys[1] = a.y; ys[2] = a.z; ys[3] = iw;
+        keep(shifted_x + i, shifted_position(a, f, iw), iw);
         continue;
     }
-    transpose(u.x, u.y, u.z, vpad);
+    const Vec v_here = load(V + i, pad), low_v_here = MIXED ? load(low_V + i, pad) : Vec{};
+    Sum u = sum_of(&v_here, &low_v_here, 0);
     if (EULER) move_mass_euler(a, u, f, iw, 0);
     else {
         real rest = CHIN4 && last ? left[i / W] : zero;
         move_mass(a, u, f, iw, substeps, rest, time, start, last, 0);
         if (CHIN4 && !last) left[i / W] = rest;
     }
-    vpad = zero;
-    transpose(a.x, a.y, a.z, iw);
-    transpose(u.x, u.y, u.z, vpad);
-    xs[0] = a.x; xs[1] = a.y; xs[2] = a.z; xs[3] = iw;
-    vs[0] = u.x; vs[1] = u.y; vs[2] = u.z; vs[3] = vpad;
+    Vec x_then, low_x_then = {}, v_then, low_v_then = {};
+    keep_sum(&x_then, &low_x_then, 0, a);
+    keep_sum(&v_then, &low_v_then, 0, u);
+    keep(X + i, x_then, iw);
+    keep(V + i, v_then, zero);
+    if (MIXED) { keep(low_X + i, low_x_then, zero); keep(low_V + i, low_v_then, zero); }
 }
 """
