@@ -1,8 +1,9 @@
-"""How much better than random search? Optimizers x seeds, the same number of evaluations each.
+"""How much better than random search? Optimizers x encodings, the same evaluations each.
 
     python benchmarks/search.py                           # the walker, 3 seeds, about 12 minutes
     python benchmarks/search.py --generations 15          # a smaller budget, about 2 minutes
     python benchmarks/search.py --preset cube --json search.json
+    python benchmarks/search.py --optimizers all --encodings all --seeds 1 2 3 4 5
 
 Every search keeps its nine best; they are simulated again, at half the time step in float64 and
 from perturbed starts. The table shows the fittest who survives both, its fitness at half the step,
@@ -13,7 +14,9 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import product
 from pathlib import Path
 from typing import Annotated
 
@@ -24,8 +27,7 @@ from rich.table import Table
 from tyro.conf import arg
 
 import warp_springs as ws
-from evolve import Search, load
-from evolve.optimizers import OPTIMIZERS
+from evolve import ENCODINGS, OPTIMIZERS, Evaluator, Search, load
 
 BASELINE = "random"
 KEPT = 9
@@ -38,7 +40,10 @@ class Options:
     preset: str = "walker"
     """A preset or a TOML file."""
     optimizers: tuple[str, ...] = ("genetic", "hill_climber", BASELINE)
-    """Which optimizers, each with its defaults, or with the preset's settings if it has any."""
+    """Which optimizers, "all" for all; each with its defaults, or with the preset's settings if it
+    has any."""
+    encodings: tuple[str, ...] = ()
+    """Which encodings, "all" for all, otherwise that of the preset."""
     seeds: tuple[int, ...] = (1, 2, 3)
     """From which everything random follows."""
     generations: int | None = None
@@ -54,6 +59,7 @@ class Outcome:
     """What one search found."""
 
     optimizer: str
+    encoding: str
     seed: int
     evaluations: int
     best: float
@@ -65,9 +71,9 @@ class Outcome:
     springs_per_second: float
 
 
-def run(options: Options, optimizer: str, seed: int) -> Outcome:
-    """Search with one optimizer from one seed."""
-    changes = {"optimizer.type": optimizer, "seed": seed}
+def run(options: Options, optimizer: str, encoding: str, seed: int) -> Outcome:
+    """Search with one optimizer over one encoding from one seed."""
+    changes = {"encoding.type": encoding, "optimizer.type": optimizer, "seed": seed}
     budget = {"generations": options.generations, "population": options.population}
     changes |= {key: value for key, value in budget.items() if value is not None}
     search = Search(load(options.preset, changes))
@@ -83,10 +89,12 @@ def run(options: Options, optimizer: str, seed: int) -> Outcome:
         genomes = new if genomes is None else search.encoding.concatenate([genomes, new])
         kept = np.argsort(-fitness, kind="stable")[:KEPT]
         genomes, fitness = search.encoding.take(genomes, kept), fitness[kept]
-    look = search.evaluator.second_look(search.encoding.express(genomes), fitness)
+    robots = search.encoding.express(genomes)
+    look = Evaluator(search.config).second_look(robots, fitness)
     champion = int(look.survives.argmax())
     return Outcome(
         optimizer=optimizer,
+        encoding=encoding,
         seed=seed,
         evaluations=search.optimizer.evaluations,
         best=float(fitness[champion]),
@@ -98,49 +106,70 @@ def run(options: Options, optimizer: str, seed: int) -> Outcome:
 
 
 def tabulate(outcomes: list[Outcome], options: Options) -> Table:
-    """Optimizers in the rows, seeds in the columns."""
-    baseline = {o.seed: o.best for o in outcomes if o.optimizer == BASELINE}
+    """Optimizers and encodings in the rows, seeds in the columns."""
+    baseline = {(o.encoding, o.seed): o.best for o in outcomes if o.optimizer == BASELINE}
     config = load(options.preset)
     budget = f"{outcomes[0].evaluations:,} evaluations"
     table = Table(title=f"{config.name}: {config.task.fitness}, {budget}")
+    table.add_column("encoding")
     table.add_column("optimizer")
     for seed in options.seeds:
         table.add_column(f"seed {seed}", justify="right")
-    table.add_column("mean", justify="right")
-    table.add_column("springs/s", justify="right")
-    for optimizer in options.optimizers:
-        row = [o for o in outcomes if o.optimizer == optimizer]
-        cells = [cell(o, baseline.get(o.seed)) for o in row]
+    for column in ("mean", "standard error", "lead", "springs/s"):
+        table.add_column(column, justify="right")
+    for encoding, optimizer in dict.fromkeys((o.encoding, o.optimizer) for o in outcomes):
+        row = [o for o in outcomes if (o.encoding, o.optimizer) == (encoding, optimizer)]
+        best = np.array([o.best for o in row])
+        first = np.array([baseline.get((encoding, o.seed), np.nan) for o in row])
+        error = best.std(ddof=1) / np.sqrt(len(best)) if len(best) > 1 else np.nan
         rate = np.mean([o.springs_per_second for o in row]) / 1e9
-        mean = np.mean([o.best for o in row])
-        table.add_row(optimizer, *cells, f"{mean:.3f}", f"{rate:.2f} G")
+        table.add_row(
+            encoding,
+            optimizer,
+            *map(cell, row),
+            f"{best.mean():.3f}",
+            f"{error:.3f}",
+            f"x{best.mean() / first.mean():.2f}",
+            f"{rate:.2f} G",
+        )
     return table
 
 
-def cell(outcome: Outcome, baseline: float | None) -> str:
-    """Fitness, fitness at half the step, lead over random search."""
+def cell(outcome: Outcome) -> str:
+    """Fitness, and fitness at half the step."""
     doubt = "" if outcome.survives else " [red]does not survive[/]"
-    lead = f"  x{outcome.best / baseline:.2f}" if baseline else ""
-    return f"{outcome.best:.3f} [dim]({outcome.again:.3f})[/]{lead}{doubt}"
+    return f"{outcome.best:.3f} [dim]({outcome.again:.3f})[/]{doubt}"
+
+
+def chosen(
+    given: tuple[str, ...], known: Mapping[str, object], usual: tuple[str, ...]
+) -> list[str]:
+    """Names that were asked for, all of them for "all"."""
+    names = list(known) if given == ("all",) else list(given or usual)
+    if unknown := set(names) - known.keys():
+        raise SystemExit(f"unknown {unknown.pop()!r}; known are {', '.join(known)}")
+    return names
 
 
 def main() -> None:
     """Run every search in turn, then print the table."""
     options = tyro.cli(Options, description=__doc__)
-    if unknown := set(options.optimizers) - OPTIMIZERS.keys():
-        raise SystemExit(f"unknown optimizer {unknown.pop()!r}; known are {', '.join(OPTIMIZERS)}")
+    usual = load(options.preset).encoding.type
+    optimizers = chosen(options.optimizers, OPTIMIZERS, ())
+    encodings = chosen(options.encodings, ENCODINGS, (usual,))
     ws.quiet()
     console = Console()
     outcomes = []
-    for seed in options.seeds:
-        for optimizer in options.optimizers:
-            with console.status(f"{optimizer}, seed {seed}"):
-                outcomes.append(run(options, optimizer, seed))
-            last = outcomes[-1]
-            console.print(f"{optimizer}, seed {seed}: {last.best:.3f} in {last.seconds:.0f} s")
+    for encoding, seed, optimizer in product(encodings, options.seeds, optimizers):
+        what = f"{optimizer} over {encoding}, seed {seed}"
+        with console.status(what):
+            outcomes.append(run(options, optimizer, encoding, seed))
+        last = outcomes[-1]
+        console.print(f"{what}: {last.best:.3f} in {last.seconds:.0f} s")
+        if options.output is not None:
+            options.output.write_text(json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
     console.print(tabulate(outcomes, options))
     if options.output is not None:
-        options.output.write_text(json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
         console.print(f"wrote {options.output}")
 
 

@@ -30,7 +30,7 @@ from evolve.search import Generation, Search, judge_together
 from evolve.store import Store, Timing
 from evolve.toml import dump, load, parse, validate
 
-__all__ = ["Progress", "Run", "Session", "evolve_together"]
+__all__ = ["Progress", "Run", "Session", "create_seeds", "evolve_together", "open_all"]
 
 RECORD = "run.sqlite"
 LEFTOVERS = (".*.part", ".usd-*")
@@ -216,6 +216,35 @@ class Run:
             file.flush()
             os.fsync(file.fileno())
         draft.replace(self.directory / "run.toml")
+
+
+def create_seeds(config: RunConfig, count: int, directory: Path) -> list[Run]:
+    """Make the folders of runs from the seed of a configuration and those that follow it.
+
+    Raises:
+        RunError, StoreError: As `Run.create`; then none is made.
+    """
+    seeds = range(config.seed, config.seed + count)
+    places = [directory / f"seed-{seed}" for seed in seeds]
+    _refuse_occupied(directory)
+    return [
+        Run.create(config.model_copy(update={"seed": seed}), place)
+        for seed, place in zip(seeds, places, strict=True)
+    ]
+
+
+def open_all(directory: Path) -> list[Run]:
+    """Open the run in a folder, or those of several seeds in the folders within.
+
+    Raises:
+        RunError, ConfigError, StoreError: As `Run.open`.
+    """
+    if (directory / "run.toml").is_file() or not directory.is_dir():
+        return [Run.open(directory)]
+    within = [path.parent for path in directory.glob("seed-*/run.toml")]
+    if not within:
+        return [Run.open(directory)]
+    return [Run.open(path) for path in sorted(within, key=lambda p: int(p.name.split("-")[1]))]
 
 
 class Session:

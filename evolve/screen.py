@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
 
 import numpy as np
@@ -28,11 +29,15 @@ LINES = 20
 
 
 class Screen:
-    """Shows the progress of a run: live on a terminal, as some clean lines anywhere else."""
+    """Shows the progress of a run: live on a terminal, as some clean lines anywhere else.
 
-    def __init__(self, console: Console, unit: str) -> None:
+    Of several runs at once it shows the sum of the evaluations, the best, and how many there are.
+    """
+
+    def __init__(self, console: Console, unit: str, runs: int = 1) -> None:
         self._console = console
         self._unit = unit
+        self._all: list[Progress | None] = [None] * runs
         self._progress: Progress | None = None
         self._seen = 0.0
         self._bests: list[float] = []
@@ -52,8 +57,12 @@ class Screen:
             yield self
             self._live.refresh()
 
-    def update(self, progress: Progress) -> None:
-        """Show the progress after a generation."""
+    def update(self, progress: Progress, which: int = 0) -> None:
+        """Show the progress after a generation of one of the runs."""
+        self._all[which] = progress
+        if any(p is None or p.generation < progress.generation for p in self._all):
+            return  # the others are not so far yet
+        progress = _joined(self._all)
         news = self._progress is not None
         self._progress, self._seen = progress, time.perf_counter()
         self._bests.append(progress.best_fitness)
@@ -113,6 +122,23 @@ class Screen:
         p = self._progress
         done = p is None or p.generation == p.generations
         return 0.0 if done else time.perf_counter() - self._seen
+
+
+def _joined(parts: list[Progress]) -> Progress:
+    """The progress of several runs as one."""
+    if len(parts) == 1:
+        return parts[0]
+    best = max(parts, key=lambda p: -math.inf if math.isnan(p.best_fitness) else p.best_fitness)
+    medians = [p.median for p in parts if not math.isnan(p.median)]
+    return replace(
+        best,
+        generation=min(p.generation for p in parts),
+        evaluations=sum(p.evaluations for p in parts),
+        failures=sum(p.failures for p in parts),
+        median=float(np.median(medians)) if medians else math.nan,
+        elapsed=max(p.elapsed for p in parts),
+        remaining=max(p.remaining for p in parts),
+    )
 
 
 def sparkline(values: list[float], width: int) -> str:

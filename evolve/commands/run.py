@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from evolve.commands.shared import Folder, Whole, evolve_to_the_end
+from evolve.errors import RunError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,15 +33,24 @@ class Run:
     """A name that `evolve presets` lists, or a file."""
     seed: Whole = None
     """From which everything random follows."""
+    seeds: Annotated[int, arg(metavar="N")] = 1
+    """Evolve so many runs at once, from the seeds that follow each other, packed into one batch a
+    generation: for learning curves with error bars. Their folders are DIR/seed-1, DIR/seed-2 ..."""
     generations: Whole = None
     """How many generations."""
     population: Whole = None
     """How many robots are evaluated in each generation."""
+    encoding: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """direct, regions, harmonics, fourier, expression, neural or cppn, with what it has in common
+    with the encoding of the preset."""
     optimizer: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """genetic, cma, age_fitness, crowding, steady_state, nsga2, map_elites, hill_climber or random,
     with its own defaults."""
     threads: Whole = None
     """Processor cores to use, otherwise all. Changes nothing but the time."""
+    devices: Annotated[tuple[str, ...], arg(metavar="DEVICE ...", help_behavior_hint="")] = ()
+    """A worker process for each, such as cpu cpu, or cuda:0 cuda:1. Changes nothing but the
+    time."""
     set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()
     """Keys of the configuration by their full names, values as in TOML."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
@@ -49,19 +59,29 @@ class Run:
     def __call__(self, console: Console) -> int:
         """Make the folder, and evolve."""
         from evolve.run import Run as RunFolder
+        from evolve.run import create_seeds
         from evolve.toml import load, parse_settings
 
         flags = {
             "seed": self.seed,
             "generations": self.generations,
             "population": self.population,
+            "encoding.type": self.encoding,
             "optimizer.type": self.optimizer,
             "simulation.threads": self.threads,
+            "simulation.devices": self.devices or None,
+            "simulation.device": self.devices[0] if self.devices else None,
         }
         given = {key: value for key, value in flags.items() if value is not None}
-        config = load(self.preset, parse_settings(self.set) | given)
+        # What a thing is comes before what it is told.
+        config = load(self.preset, given | parse_settings(self.set))
         folder = self.out if self.out is not None else Path("runs") / config.name
-        return evolve_to_the_end(RunFolder.create(config, folder), console)
+        if self.seeds < 1:
+            raise RunError(f"--seeds must be 1 or more, not {self.seeds}")
+        if self.seeds == 1:
+            return evolve_to_the_end([RunFolder.create(config, folder)], console)
+        runs = create_seeds(config, self.seeds, folder)
+        return evolve_to_the_end(runs, console)
 
 
 @dataclass(frozen=True)
@@ -73,7 +93,7 @@ class Resume:
     """
 
     directory: Folder
-    """Folder of the run."""
+    """Folder of the run, or of several that were started with --seeds."""
     generations: Whole = None
     """A new number of generations, to make the run longer."""
     threads: Whole = None
@@ -81,8 +101,9 @@ class Resume:
 
     def __call__(self, console: Console) -> int:
         """Open the folder, and go on."""
-        from evolve.run import Run as RunFolder
+        from evolve.run import open_all
 
-        run = RunFolder.open(self.directory)
-        run.change(generations=self.generations, threads=self.threads)
-        return evolve_to_the_end(run, console)
+        runs = open_all(self.directory)
+        for run in runs:
+            run.change(generations=self.generations, threads=self.threads)
+        return evolve_to_the_end(runs, console)

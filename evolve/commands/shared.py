@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,28 +23,35 @@ Folder = Annotated[Positional[Path], arg(metavar="DIR")]
 Whole = Annotated[int | None, arg(metavar="N", help_behavior_hint="")]
 
 
-def evolve_to_the_end(run: runs.Run, console: Console) -> int:
-    """Evolve a run to its end, or until Ctrl-C, with everything a person wants to see."""
+def evolve_to_the_end(together: Sequence[runs.Run], console: Console) -> int:
+    """Evolve runs to their end, or until Ctrl-C, with everything a person wants to see."""
     import warp_springs as ws
     from evolve.fitness import UNITS
     from evolve.report import describe
+    from evolve.run import evolve_together
     from evolve.screen import Screen, interruptible
 
-    config = run.config
+    config = together[0].config
+    folder = together[0].directory if len(together) == 1 else together[0].directory.parent
     console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
-    for subject, words in [*describe(config), ("folder", str(run.directory))]:
+    facts = [*describe(config), ("folder", str(folder))]
+    if len(together) > 1:
+        facts.append(("seeds", ", ".join(str(run.config.seed) for run in together)))
+    for subject, words in facts:
         console.print(f"[dim]{subject:<8}[/]{words}", highlight=False, soft_wrap=True)
     ws.quiet()
-    screen = Screen(console, UNITS[config.task.fitness])
+    screen = Screen(console, UNITS[config.task.fitness], len(together))
+    watches = [partial(screen.update, which=i) for i in range(len(together))]
     try:
         with interruptible() as stopping, screen.showing(stopping):
-            complete = run.evolve(screen.update, stopping.is_set)
+            complete = evolve_together(together, watches, stopping.is_set)
         if complete:
-            _finish(run, console)
+            for run in together:
+                _finish(run, console)
             return 0
     except KeyboardInterrupt:
         pass
-    print(f"stopped; continue with: evolve resume {run.directory}")
+    print(f"stopped; continue with: evolve resume {folder}")
     return INTERRUPTED
 
 

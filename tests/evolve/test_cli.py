@@ -244,3 +244,33 @@ def test_a_terminal_sees_a_live_display(tmp_path):
     seen = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text)
     for piece in ("4/4 generations", "96 evaluations", "champion #", "wrote"):
         assert piece in seen
+
+
+def test_several_seeds_at_once_are_what_they_are_alone(shell, run_folder):
+    done = shell("run", "cube", "--seed", 4, "--seeds", 2, "--out", "many", *flags())
+    assert done.returncode == 0, done.stderr
+    assert "seeds   4, 5" in done.stdout and "192 evaluations" in done.stdout
+    assert len(re.findall("champion #", done.stdout)) == 2
+    assert shell("digest", "many/seed-5").stdout == shell("digest", "runs/cube").stdout
+    longer = shell("resume", "many", "--generations", 5)
+    assert "generation 5/5" in longer.stdout and "240 evaluations" in longer.stdout
+    refused = shell("run", "cube", "--seeds", 2, "--out", "many", *flags())
+    assert refused.returncode == 1 and "many is not empty" in refused.stderr
+    refused = shell("run", "cube", "--seeds", 0, *flags())
+    assert refused.stderr == "evolve: --seeds must be 1 or more, not 0\n"
+
+
+def test_another_encoding_is_one_word_and_devices_are_workers(shell):
+    done = shell(
+        "run", "cube", "--encoding", "fourier", "--devices", "cpu", "cpu", *flags(),
+        "encoding.waves=1",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "genetic over fourier genomes" in done.stdout
+    alone = shell(
+        "run", "cube", "--encoding", "fourier", "--out", "alone", *flags(), "encoding.waves=1"
+    )
+    assert alone.returncode == 0, alone.stderr
+    assert shell("digest", "alone").stdout == shell("digest", "runs/cube").stdout
+    wrong = shell("run", "cube", "--encoding", "fourrier")
+    assert wrong.returncode == 1 and "encoding.type must be one of" in wrong.stderr

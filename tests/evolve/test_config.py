@@ -24,7 +24,8 @@ def test_every_preset_is_complete_and_survives_being_written(name):
 
 
 def test_the_presets_are_there():
-    assert {"walker", "cube"} <= set(preset_names())
+    wanted = {"walker", "cube", "octahedron", "worm", "starfish", "tripod", "blob"}
+    assert wanted <= set(preset_names())
 
 
 @given(

@@ -23,10 +23,12 @@ NO_PERTURBATION = {
 
 SMALL = {"population": 64, "generations": 8}
 EXPLOIT = SMALL | {"simulation.dt": 4e-3, "scene.damping": 1.0}
-"""A step 2.4 times as long as `ws.stable_dt` allows, and little damping. From seed 1, and from
-each of the six after it, the cube evolves within some generations to draw its speed from the
-integrator: 1.86 body diameters a cycle, six times what the preset's cube reaches. At half the step
-6 % of it is left, as much as at a thirtieth."""
+"""A step 2.4 times as long as `ws.stable_dt` allows, and little damping. From most seeds the cube
+evolves within some generations to draw its speed from the integrator: more than a body diameter a
+cycle, three times what the preset's cube reaches. Which exploit is found follows from the last bit
+of the arithmetic, so several seeds are looked at."""
+HONEST = 0.9
+"""No cube of these springs is faster by honest means [body diameters per cycle]."""
 
 
 def some_robots(config: RunConfig, n: int) -> ws.Variants:
@@ -41,13 +43,20 @@ def crowned(config: RunConfig, folder) -> tuple[Run, list]:
         return run, crown(run, store)
 
 
-def test_an_exploit_of_the_integrator_is_not_crowned(tmp_path):
-    run, finalists = crowned(load("cube", EXPLOIT), tmp_path / "exploit")
-    cheat = finalists[0]
-    assert cheat.fitness > 1.0 and cheat.generation > 0, "evolution still finds the exploit"
-    assert cheat.halved_kept < 0.6 and cheat.perturbed_kept < 0.6
-    assert not any(finalist.survives for finalist in finalists)
-    assert verdict(finalists, run.config).startswith("no champion: none of the 32 best survives")
+def test_exploits_of_the_integrator_are_not_crowned(tmp_path):
+    found = 0
+    for seed in (1, 2, 3):
+        run, finalists = crowned(load("cube", EXPLOIT | {"seed": seed}), tmp_path / str(seed))
+        fittest = max(finalists, key=lambda finalist: finalist.fitness)
+        found += fittest.fitness > 1.0 and fittest.generation > 0 and fittest.halved_kept < 0.6
+        champion = finalists[0]
+        if champion.survives:
+            assert champion.fitness < HONEST
+        else:
+            words = "no champion: none of the 32 best survives"
+            assert verdict(finalists, run.config).startswith(words)
+        assert all(f.fitness < HONEST for f in finalists if f.survives)
+    assert found >= 2, "evolution still finds the exploit"
 
 
 def test_a_healthy_walker_is_crowned(tmp_path):
