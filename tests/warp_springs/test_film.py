@@ -207,7 +207,7 @@ def test_robots_on_a_grid_never_meet_in_a_film():
     result = ws.Simulation(robots, scene).run(1.0, fps=10)
     look = Look(layout="grid")
     film = Film(result, range(4), look, Cut(), Rasteriser(SIZE))
-    actors = film._shots[0][0]._actors
+    actors = film.shots[0][0].actors
     for t in np.linspace(0, 1, 11):
         middles = [a.positions(t).mean(axis=0) for a in actors]
         for i in range(4):
@@ -217,7 +217,7 @@ def test_robots_on_a_grid_never_meet_in_a_film():
 
 def test_robots_of_a_world_stay_where_they_are(walk):
     film = Film(walk, [0, 1], Look(layout="world"), Cut(), Rasteriser(SIZE))
-    actors = film._shots[0][0]._actors
+    actors = film.shots[0][0].actors
     for i in (0, 1):
         np.testing.assert_array_equal(actors[i].positions(0.0), walk.frames(i)[0])
 

@@ -36,7 +36,12 @@ _MOST_HIDDEN = 0.08
 
 
 class Shot:
-    """Robots in one picture or in one tile of a panel, from one camera."""
+    """Robots in one picture or in one tile of a panel, from one camera.
+
+    Attributes:
+        actors: The robots at their places.
+        director: Decides on the camera.
+    """
 
     def __init__(
         self,
@@ -62,7 +67,7 @@ class Shot:
             tile: Whether this is a tile of a panel.
             grid: Whether the robots are to be moved onto a grid.
         """
-        self._actors, self._scene, self._look = actors, scene, look
+        self.actors, self._scene, self._look = actors, scene, look
         self._rasteriser, self._tile = rasteriser, tile
         self._floor = scene.ground is not None
         self._setting = {"size": rasteriser.size, "look": look, "cut": cut}
@@ -77,8 +82,8 @@ class Shot:
 
     def draw(self, time: float, share: float = 0.0) -> Pixels:
         """Return the picture at a time [s], after a share 0 ... 1 of the film."""
-        drawing = draw_scene(self._actors, self._scene, self._look, time)
-        camera = self._director.camera(time, share)
+        drawing = draw_scene(self.actors, self._scene, self._look, time)
+        camera = self.director.camera(time, share)
         pixels = self._rasteriser.draw(drawing, camera)
         if self._tile:
             for image in self._images:
@@ -89,8 +94,8 @@ class Shot:
         return pixels
 
     def _direct(self, back: float = 1.0) -> None:
-        self._director = Director(self._actors, **self._setting)
-        self._director.stand_back(back * (_SURROUNDED if self._scene.obstacles else 1.0))
+        self.director = Director(self.actors, **self._setting)
+        self.director.stand_back(back * (_SURROUNDED if self._scene.obstacles else 1.0))
         self._hang_labels()
 
     def _make_room(self, cells: FloatArray | None) -> None:
@@ -100,7 +105,7 @@ class Shot:
             crowded, cut_off = self._faults()
             if crowded and cells is not None:
                 apart *= _APART
-                spread(self._actors, cells, apart)
+                spread(self.actors, cells, apart)
             elif cut_off:
                 back *= _BACK
             else:
@@ -109,7 +114,7 @@ class Shot:
 
     def _samples(self) -> list[tuple[float, float]]:
         """Times that are looked at beforehand, and their shares of the film."""
-        times = self._actors[0].times
+        times = self.actors[0].times
         chosen = np.unique(np.linspace(0, len(times) - 1, _SAMPLES).astype(int))
         return [(float(times[i]), i / max(len(times) - 1, 1)) for i in chosen]
 
@@ -117,17 +122,17 @@ class Shot:
         """Find how far below the place of a robot its label must hang to hide none of it."""
         if self._tile or not self._images:
             return
-        self._drops = np.full(len(self._actors), -np.inf)
+        self._drops = np.full(len(self.actors), -np.inf)
         for time, share in self._samples():
-            camera = self._director.camera(time, share)
-            for i, actor in enumerate(self._actors):
+            camera = self.director.camera(time, share)
+            for i, actor in enumerate(self.actors):
                 below = self._seen(actor, time, camera)[3]
                 anchor = self._anchor(actor, time, camera)[1]
                 self._drops[i] = max(self._drops[i], below - anchor)
 
     def _label_boxes(self, time: float, camera) -> list[texts.Box]:
         boxes = []
-        for actor, image, drop in zip(self._actors, self._images, self._drops, strict=False):
+        for actor, image, drop in zip(self.actors, self._images, self._drops, strict=False):
             middle, row, _ = self._anchor(actor, time, camera)
             boxes.append(texts.box_below(image, middle, row + drop))
         return boxes
@@ -152,8 +157,8 @@ class Shot:
         width, height = self._rasteriser.size
         crowded = cut_off = False
         for time, share in self._samples():
-            camera = self._director.camera(time, share)
-            robots = [self._seen(a, time, camera) for a in self._actors]
+            camera = self.director.camera(time, share)
+            robots = [self._seen(a, time, camera) for a in self.actors]
             words = self._label_boxes(time, camera) if self._images else []
             for i, word in enumerate(words):
                 others = words[:i] + [r for k, r in enumerate(robots) if k != i]
@@ -170,6 +175,7 @@ class Film:
         size: Width and height in pixels.
         times: The time [s] of each picture.
         fps: Pictures per second of watching.
+        shots: Each shot with the rows and columns of the picture that it fills.
     """
 
     def __init__(
@@ -205,9 +211,9 @@ class Film:
         if layout != "panel" or len(actors) == 1:
             grid = layout == "grid" and len(actors) > 1
             shot = Shot(actors, scene, look, cut, rasteriser, labels=labels, grid=grid)
-            self._shots = [(shot, slice(None), slice(None))]
+            self.shots = [(shot, slice(None), slice(None))]
         else:
-            self._shots = list(_panel(actors, scene, look, cut, rasteriser, labels))
+            self.shots = list(_panel(actors, scene, look, cut, rasteriser, labels))
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -222,7 +228,7 @@ class Film:
         time, share = float(self.times[k]), k / len(self.times)
         pixels = np.empty((self.size[1], self.size[0], 3), np.uint8)
         pixels[:] = _GUTTER_COLOR
-        for shot, rows, columns in self._shots:
+        for shot, rows, columns in self.shots:
             pixels[rows, columns] = shot.draw(time, share)
         self._write(pixels, time)
         return pixels
