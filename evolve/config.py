@@ -52,6 +52,17 @@ class SimulationConfig(configs.SimulationConfig):
     """A worker process for each: ["cuda:0", "cuda:1"], or ["cpu", "cpu"]; none when empty. The
     results do not depend on how many there are."""
 
+    cluster: str = ""
+    """Address of a Ray cluster whose actors take the place of the worker processes, "auto" for the
+    one this machine belongs to, "local" for one of its own; empty for none. Needs the extra `ray`.
+    """
+
+    @model_validator(mode="after")
+    def _a_cluster_has_workers(self) -> SimulationConfig:
+        if self.cluster and not self.devices:
+            raise ValueError("cluster: simulation.devices must say how many workers, and on what")
+        return self
+
     @model_validator(mode="after")
     def _devices_are_alike(self) -> SimulationConfig:
         kinds = {device.partition(":")[0] for device in (self.device, *self.devices)}

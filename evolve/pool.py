@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import multiprocessing as mp
 from collections import deque
 from collections.abc import Sequence
@@ -11,19 +10,16 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from evolve.encodings.base import Genomes
 from evolve.errors import RunError
 from evolve.scores import Scores
+from evolve.workshop import Workshop, chunks, cores
 
 if TYPE_CHECKING:
     from evolve.config import RunConfig
 
 __all__ = ["Pool"]
 
-CHUNKS_PER_WORKER = 2
-"""So that whoever is done early takes over work of the others."""
 LIVES = 3
 """Workers that one chunk may kill before the run gives up."""
 
@@ -51,15 +47,13 @@ class Pool:
         self._context = mp.get_context("spawn")
         self._config = dump(config)
         devices = config.simulation.devices
-        self._threads = max(1, (config.simulation.threads or _cores()) // len(devices))
+        self._threads = max(1, (config.simulation.threads or cores()) // len(devices))
         self._workers = [self._start(device) for device in devices]
 
     def __call__(self, genomes: Genomes, blobs: Sequence[bytes]) -> Scores:
         """Scores of n genomes, by their bytes."""
-        count = min(len(blobs), CHUNKS_PER_WORKER * len(self._workers))
-        edges = np.linspace(0, len(blobs), count + 1).round().astype(int)
-        chunks = [list(blobs[a:b]) for a, b in itertools.pairwise(edges)]
-        return Scores.concatenate(self._judged(chunks))
+        parts = chunks(blobs, len(self._workers))
+        return Scores.concatenate(self._judged(parts))
 
     def prepare(self, blobs: Sequence[bytes]) -> None:
         """Load the kernels in every worker, one after the other: the first may compile them."""
@@ -149,36 +143,15 @@ def _work(config: str, device: str, threads: int, pipe: Connection) -> None:
     """A worker: takes chunks of genomes as bytes and answers their scores, until the pipe ends."""
     import signal
 
-    import warp_springs as ws
-    from evolve.evaluate import Evaluator
-    from evolve.toml import parse
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to answer
-    ws.quiet()
-    settings = {"simulation.device": device, "simulation.threads": threads}
-    run = parse(config, "the run", settings | {"simulation.devices": []})
-    encoding, evaluator = run.make_encoding(), Evaluator(run)
+    workshop = Workshop(config, device, threads)
     while True:
         try:
             blobs = pipe.recv()
         except (EOFError, OSError):
             return
         try:
-            scores = evaluator(encoding.express(encoding.from_bytes(blobs)))
-            answer = (
-                scores.fitness,
-                scores.status,
-                dict(scores.descriptors),
-                scores.spring_evaluations,
-            )
+            answer = workshop.judge(blobs)
         except Exception as error:
             answer = RunError(f"a worker on {device} failed: {type(error).__name__}: {error}")
         pipe.send(answer)
-
-
-def _cores() -> int:
-    import os
-
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

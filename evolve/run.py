@@ -378,7 +378,7 @@ def _decisive(config: RunConfig) -> dict[str, Any]:
         "about": True,
         "generations": True,
         "budget": True,
-        "simulation": {"threads", "devices"},
+        "simulation": {"threads", "devices", "cluster"},
         "task": {"second_look"},
     }
     flat: dict[str, Any] = {}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from evolve.cluster import Cluster
 from evolve.config import RunConfig
 from evolve.evaluate import Evaluator
 from evolve.judge import Judge, Simulator
@@ -51,14 +52,16 @@ class Search:
         self.cost, self.seconds = 0, 0.0
 
     def _make_simulator(self) -> Simulator:
+        if self.config.simulation.cluster:
+            return Cluster(self.config)
         if self.config.simulation.devices:
             return Pool(self.config)
         evaluator, encoding = Evaluator(self.config), self.encoding
         return lambda genomes, blobs: evaluator(encoding.express(genomes))
 
     def close(self) -> None:
-        """End the worker processes, if there are any."""
-        if self._own and isinstance(self.simulator, Pool):
+        """End the workers, if there are any."""
+        if self._own and isinstance(self.simulator, (Pool, Cluster)):
             self.simulator.close()
 
     @property
@@ -75,7 +78,7 @@ class Search:
     def prepare(self) -> None:
         """Load the kernels, so that the first step takes no longer than the others."""
         genomes = self.encoding.random(self.config.population, Streams(0)(0, Role.INITIAL))
-        if isinstance(self.simulator, Pool):
+        if isinstance(self.simulator, (Pool, Cluster)):
             self.simulator.prepare(self.encoding.to_bytes(genomes))
         else:
             Evaluator(self.config).prepare(self.encoding.express(genomes))

@@ -51,6 +51,8 @@ class Run:
     devices: Annotated[tuple[str, ...], arg(metavar="DEVICE ...", help_behavior_hint="")] = ()
     """A worker process for each, such as cpu cpu, or cuda:0 cuda:1. Changes nothing but the
     time."""
+    cluster: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    """Put those workers on a Ray cluster: its address, auto, or local for one of this machine."""
     set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()
     """Keys of the configuration by their full names, values as in TOML."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
@@ -71,6 +73,7 @@ class Run:
             "simulation.threads": self.threads,
             "simulation.devices": self.devices or None,
             "simulation.device": self.devices[0] if self.devices else None,
+            "simulation.cluster": self.cluster,
         }
         given = {key: value for key, value in flags.items() if value is not None}
         # What a thing is comes before what it is told.
