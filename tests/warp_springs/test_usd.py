@@ -13,6 +13,7 @@ from warp_springs.io import usd_geometry, usd_layout
 from warp_springs.view import appearance
 
 FPS = 30
+SIDES = usd_geometry.FINE.sides
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +211,7 @@ def test_bars_end_at_their_masses(stage, exported):
     for frame in (0, 9):
         masses = mass_positions(stage, walker, frame)
         points, joints = skinned(stage, walker, frame)["bars"]
-        ends = points.reshape(len(springs), 2, usd_geometry.TUBE_SIDES, 3).mean(axis=2)
+        ends = points.reshape(len(springs), 2, SIDES, 3).mean(axis=2)
         assert np.abs(ends - masses[springs]).max() < 5e-5
         assert np.array_equal(joints.reshape(len(springs), 2, -1)[:, :, 0], springs)
 
@@ -250,7 +251,7 @@ def test_colours_follow_the_stress(tmp_path):
     mesh = stage.GetPrimAtPath(robot.GetPath().AppendPath("robot_0000_body/robot_0000_bars"))
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("displayColor")
     assert primvar.GetInterpolation() == "uniform"
-    faces = np.array(primvar.ComputeFlattened(0)).reshape(usd_geometry.TUBE_SIDES, 3, 3)
+    faces = np.array(primvar.ComputeFlattened(0)).reshape(SIDES, 3, 3)
     assert (np.ptp(faces, axis=0) == 0).all()
     stretched, compressed, resting = faces[0]
     np.testing.assert_allclose(stretched, appearance.TENSION, rtol=1e-5)
@@ -269,7 +270,7 @@ def test_colours_in_every_frame_are_those_of_the_tensions(stage, exported):
     expected = appearance.stress_index(tension, scale)
     assert 0 < np.mean(expected > appearance.STRESS_STEPS) < 1
     for frame, colors in enumerate(expected):
-        shown = np.array(indices.Get(frame)).reshape(usd_geometry.TUBE_SIDES, -1)
+        shown = np.array(indices.Get(frame)).reshape(SIDES, -1)
         assert (shown == colors).all()
 
 
@@ -499,10 +500,11 @@ def face_normals(part):
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def test_meshes_face_outward(cube):
+@pytest.mark.parametrize("detail", [usd_geometry.COARSE, usd_geometry.FINE])
+def test_meshes_face_outward(cube, detail):
     middle = cube.positions - cube.center_of_mass
-    tubes = usd_geometry.tubes(middle, cube.springs, 0.01)
-    balls = usd_geometry.balls(middle, 0.02)
+    tubes = usd_geometry.tubes(middle, cube.springs, 0.01, detail.sides)
+    balls = usd_geometry.balls(middle, 0.02, detail.cuts)
     for part in (tubes, balls):
         np.testing.assert_allclose(np.linalg.norm(part.normals, axis=1), 1.0)
         along = np.einsum("fi,fci->fc", face_normals(part), part.normals[part.corner_normals])
@@ -518,11 +520,12 @@ def test_meshes_face_outward(cube):
     assert (np.sum(face_normals(skin) * outward, axis=1) > 0).all()
 
 
-def test_a_ball_is_closed():
-    ball = usd_geometry.balls(np.zeros((1, 3)), 1.0)
+@pytest.mark.parametrize(("cuts", "faces"), [(2, 48), (4, 192)])
+def test_a_ball_is_closed(cuts, faces):
+    ball = usd_geometry.balls(np.zeros((1, 3)), 1.0, cuts)
     edges = np.concatenate([ball.faces[:, [0, 1]], ball.faces[:, [1, 2]], ball.faces[:, [2, 0]]])
     there = {tuple(edge) for edge in edges.tolist()}
-    assert len(there) == 3 * 48 and all((b, a) in there for a, b in there)
+    assert len(there) == 3 * faces and all((b, a) in there for a, b in there)
 
 
 def test_tubes_are_cut_almost_straight():
@@ -530,7 +533,7 @@ def test_tubes_are_cut_almost_straight():
     axes = usd_geometry.axes()[usd_geometry.nearest_axes(vectors)]
     cosines = np.abs(np.sum(axes * vectors, axis=1)) / np.linalg.norm(vectors, axis=1)
     assert np.degrees(np.arccos(cosines.min())) < 7.0
-    rings = usd_geometry.ring_normals().reshape(-1, usd_geometry.TUBE_SIDES, 3)
+    rings = usd_geometry.ring_normals(SIDES).reshape(-1, SIDES, 3)
     assert np.abs(np.einsum("aki,ai->ak", rings, usd_geometry.axes())).max() < 1e-12
 
 

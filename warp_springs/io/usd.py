@@ -12,6 +12,7 @@ import numpy as np
 
 from warp_springs.checks import check_choice, check_number
 from warp_springs.io.outputs import checked_output, written_beside
+from warp_springs.io.usd_geometry import COARSE, FINE, Detail
 from warp_springs.io.usd_layout import (
     Paint,
     Track,
@@ -24,7 +25,9 @@ from warp_springs.io.usd_layout import (
     unique_names,
 )
 from warp_springs.io.usd_notes import facts, provenance, usd_dict
+from warp_springs.surfaces import Plane
 from warp_springs.view import appearance
+from warp_springs.view.solids import obstacle_mesh
 
 if TYPE_CHECKING:
     from pxr import Usd, UsdGeom
@@ -42,6 +45,8 @@ Springs = Literal["auto", "all", "surface"]
 
 MOST_JOINTS = 1000
 """Masses of a robot beyond which it is drawn as points and curves, unless asked otherwise."""
+_FINE = 4000
+"""Masses and springs of a file up to which they are finely meshed; beyond, size counts more."""
 _SUFFIXES = (".usdc", ".usda", ".usdz")
 _BLOCK_BYTES = 16_000_000
 """Samples held in memory between two saves."""
@@ -98,7 +103,7 @@ def export_usd(
         custom_data: For a robot by its index, what to keep on its prim: numbers, strings,
             booleans, sequences and nested dicts of them, for example fitness and seed.
         grid: Whether several robots are put on a square grid, each starting in the middle of its
-            cell; otherwise all stay where they were simulated, as they do among obstacles.
+            cell, with its obstacles around it; otherwise all stay where they were simulated.
         spacing: Distance of the cells [m]; by default large enough that no two robots touch in
             any frame.
         geometry: ``"skel"``, a joint for each mass and meshes bound to them: small, and played by
@@ -133,7 +138,7 @@ def export_usd(
     }
     tracks = [track(result, index) for index in indices]
     shown = [_shown(item.robot, springs) for item in tracks]
-    on_grid = grid and len(tracks) > 1 and not result.scene.obstacles
+    on_grid = grid and len(tracks) > 1
     drawn = [
         _Drawn(*each)
         for each in zip(
@@ -141,7 +146,9 @@ def export_usd(
             shown,
             [_chosen_geometry(item.robot, geometry) for item in tracks],
             paints(shown, color),
-            placed(tracks, spacing) if on_grid else np.zeros((len(tracks), 3)),
+            placed(tracks, spacing, _solid_boxes(result))
+            if on_grid
+            else np.zeros((len(tracks), 3)),
             [str(names.get(index, f"robot_{index:04d}")) for index in indices],
             [notes.get(index, {}) for index in indices],
             strict=True,
@@ -166,11 +173,13 @@ def _write(
     _add_surroundings(stage, looks, result, drawn)
     prims = unique_names([each.name for each in drawn], usd_stage.SCENERY)
     saver = _Saver(stage, len(drawn), progress)
+    few = sum(each.robot.n_masses + each.robot.n_springs for each in drawn) <= _FINE
+    detail = FINE if few else COARSE
     for each, prim in zip(drawn, prims, strict=True):
         xform = UsdGeom.Xform.Define(stage, usd_stage.ROBOTS.AppendChild(prim))
         xform.GetPrim().SetDisplayName(each.name)
         Usd.ModelAPI(xform).SetKind("component")
-        scale = _write_motion(xform, looks, result, each, saver)
+        scale = _write_motion(xform, looks, detail, result, each, saver)
         data = {"warp_springs": facts(result, each.item, scale)} | each.notes
         xform.GetPrim().SetCustomData(data)
     stage.Save()
@@ -178,31 +187,43 @@ def _write(
 
 
 def _add_surroundings(stage: Usd.Stage, looks: Looks, result: Result, drawn: list[_Drawn]) -> None:
-    """Cameras, floor and lights around the space that the robots take."""
-    from warp_springs.io import usd_stage
+    """Cameras, floor, obstacles and lights around the space that the robots take."""
+    from warp_springs.io import usd_cameras, usd_scenery
 
-    low = np.stack([each.item.low + each.offset for each in drawn])
-    high = np.stack([each.item.high + each.offset for each in drawn])
+    tracks, offsets = [each.item for each in drawn], np.stack([each.offset for each in drawn])
+    low = np.stack([item.low for item in tracks]) + offsets[:, None]
+    high = np.stack([item.high for item in tracks]) + offsets[:, None]
     boxes = np.stack([low.min(axis=1), high.max(axis=1)], axis=1)
-    distance = usd_stage.add_camera(stage, boxes)
-    usd_stage.add_follow_camera(stage, low, high, result.times)
+    distance = usd_cameras.add_camera(stage, boxes)
+    usd_cameras.add_follow_camera(stage, low, high, result.times)
     if result.scene.ground is not None:
         tile = appearance.tile_size(np.linalg.norm(high[:, 0] - low[:, 0], axis=1))
         middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
-        ball = max(each.item.ball for each in drawn)
-        usd_stage.add_ground(stage, looks, middle, distance, tile, ball)
-    usd_stage.add_lights(stage)
+        ball = max(item.ball for item in tracks)
+        usd_scenery.add_ground(stage, looks, middle, distance, tile, ball)
+    usd_scenery.add_obstacles(stage, looks, result.scene, tracks, offsets)
+    usd_scenery.add_lights(stage, distance)
 
 
 def _write_motion(
-    xform: UsdGeom.Xform, looks: Looks, result: Result, each: _Drawn, saver: _Saver
+    xform: UsdGeom.Xform,
+    looks: Looks,
+    detail: Detail,
+    result: Result,
+    each: _Drawn,
+    saver: _Saver,
 ) -> float:
     """Write one robot in blocks of frames; returns the tension of the full stress colour [N]."""
+    from warp_springs.io.usd_scenery import add_pushes
+
     item, frames = each.item, np.asarray(result.frames(each.item.index))
     radii = (item.bar, item.ball)
-    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii)
+    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail)
     most = max(1, min(_SCALE_FRAMES, _SCALE_SPRINGS // max(each.robot.n_springs, 1)))
     scale = appearance.stress_scale(_tension(each, frames, _spread(len(frames), most)))
+    add_pushes(
+        xform.GetPrim().GetStage(), looks, item, frames, each.offset, xform.GetPrim().GetName()
+    )
     step = max(1, _BLOCK_BYTES // body.bytes_a_frame)
     for first in range(0, len(frames), step):
         block = np.arange(first, min(first + step, len(frames)))
@@ -276,6 +297,13 @@ def _renamed_when_done(path: Path) -> Iterator[Path]:
     # A stage that is open on the old file in this process shows the new one.
     if layer := Sdf.Layer.Find(str(path)):
         layer.Reload(force=True)
+
+
+def _solid_boxes(result: Result) -> list[np.ndarray]:
+    """Lowest and highest corner of each obstacle that has an end [m], (2, 3)."""
+    bounded = [each for each in result.scene.obstacles if not isinstance(each, Plane)]
+    meshes = (obstacle_mesh(each, np.zeros((2, 3)))[0] for each in bounded)
+    return [np.stack([points.min(axis=0), points.max(axis=0)]) for points in meshes]
 
 
 def _shown(robot: Robot, springs: Springs) -> Robot:

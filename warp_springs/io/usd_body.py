@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 # Only the exporter imports this module, when it has something to write.
 from pxr import Sdf, Usd, UsdGeom, Vt  # noqa: TID253
 
-from warp_springs.io.usd_geometry import quaternions, rigid_fit
+from warp_springs.io.usd_geometry import Detail, quaternions, rigid_fit
 from warp_springs.io.usd_layout import Paint
 from warp_springs.io.usd_stage import Looks, vec3f
 from warp_springs.robot import Robot
@@ -36,6 +36,7 @@ class Body(ABC):
         paint: The colours of its bars.
         looks: The materials of the stage.
         radii: Of the bars and of the balls [m].
+        detail: How finely they are meshed.
     """
 
     def __init__(
@@ -45,12 +46,14 @@ class Body(ABC):
         paint: Paint,
         looks: Looks,
         radii: tuple[float, float],
+        detail: Detail,
     ) -> None:
         self._path = xform.GetPath()
         self._stage: Usd.Stage = xform.GetPrim().GetStage()
         self._robot, self._paint, self._looks = robot, paint, looks
         self._rest = robot.positions - robot.positions.mean(axis=0)
         self._bar, self._ball = radii
+        self._detail = detail
         self._reach = 1.001 * max(self._bar, self._ball)
         self._turned: FloatArray | None = None
         self._boxes: list[FloatArray] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +12,22 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-TUBE_SIDES = 5
-"""Faces around a bar. An odd number: the outline is then almost equally wide from every side."""
+
+class Detail(NamedTuple):
+    """How finely round things are meshed.
+
+    Attributes:
+        sides: Faces around a bar. An odd number: the outline is then almost equally wide from
+            every side.
+        cuts: Cuts of each edge of the cube that is blown up to a ball.
+    """
+
+    sides: int
+    cuts: int
+
+
+COARSE, FINE = Detail(5, 2), Detail(9, 4)
+_ARROW_SIDES = 16
 _AXIS_STEPS = 12
 """Directions of bars are told apart in so many steps across a face of the unit cube."""
 
@@ -36,8 +50,8 @@ class Part(NamedTuple):
     corner_normals: IntArray | None = None
 
 
-def tubes(positions: FloatArray, springs: IntArray, radius: float) -> Part:
-    """Every spring as an open tube of `TUBE_SIDES` faces; each end follows its mass.
+def tubes(positions: FloatArray, springs: IntArray, radius: float, sides: int) -> Part:
+    """Every spring as an open tube of so many faces; each end follows its mass.
 
     The first faces of all tubes come first, then the second ones: a value for each spring that is
     repeated for its faces is then the same sequence over and over, which packs well. Normals come
@@ -45,8 +59,8 @@ def tubes(positions: FloatArray, springs: IntArray, radius: float) -> Part:
     nearest direction of that table, at most 7 degrees from its own. A spring without length points
     up, so that its faces stay finite.
     """
-    n, count = TUBE_SIDES, len(springs)
-    table = ring_normals()
+    n, count = sides, len(springs)
+    table = ring_normals(sides)
     axis = nearest_axes(positions[springs[:, 1]] - positions[springs[:, 0]])
     ring = table.reshape(-1, n, 3)[axis]
     ends = positions[springs][:, :, None] + radius * ring[:, None]
@@ -83,19 +97,19 @@ def axes() -> FloatArray:
 
 
 @cache
-def ring_normals() -> FloatArray:
-    """Around each direction of the table, `TUBE_SIDES` unit vectors across it, (A * sides, 3)."""
+def ring_normals(sides: int) -> FloatArray:
+    """Around each direction of the table, so many unit vectors across it, (A * sides, 3)."""
     along = axes()
     u = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     v = np.cross(along, u)
-    angle = np.arange(TUBE_SIDES)[:, None] * (2.0 * np.pi / TUBE_SIDES)
+    angle = np.arange(sides)[:, None] * (2.0 * np.pi / sides)
     return (np.cos(angle) * u[:, None] + np.sin(angle) * v[:, None]).reshape(-1, 3)
 
 
-def balls(positions: FloatArray, radius: float) -> Part:
-    """A ball of 48 faces at every mass."""
-    corners, faces = _unit_ball()
+def balls(positions: FloatArray, radius: float, cuts: int) -> Part:
+    """A ball at every mass: a cube with each face cut in ``cuts`` squared, blown up."""
+    corners, faces = _unit_ball(cuts)
     points = positions[:, None] + radius * corners
     m, n = len(positions), len(corners)
     return Part(
@@ -112,6 +126,35 @@ def skin(positions: FloatArray, faces: IntArray) -> Part:
     corners = faces.ravel()
     triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
     return Part(positions[corners], triangles, corners)
+
+
+def arrow(vector: FloatArray, radius: float) -> Part:
+    """An arrow from the origin to the tip of a vector (3,), its shaft of a radius [m]."""
+    length = float(np.linalg.norm(vector))
+    radius = min(radius, 0.06 * length)
+    neck = max(length - 7.0 * radius, 0.5 * length)
+    # Rings: how far along, how wide; each pair of neighbours is a band of faces.
+    rings = [(0.0, 0.0), (0.0, radius), (neck, radius), (neck, 2.5 * radius), (length, 0.0)]
+    along = vector / length
+    u = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    u /= np.linalg.norm(u)
+    angle = np.arange(_ARROW_SIDES)[:, None] * (2.0 * np.pi / _ARROW_SIDES)
+    around = np.cos(angle) * u + np.sin(angle) * np.cross(along, u)
+    points = [far * along + wide * around for far, wide in rings]
+    normals = []
+    for (far, wide), (far2, wide2) in pairwise(rings):
+        normal = (far2 - far) * around - (wide2 - wide) * along
+        normals.append(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    n, band = _ARROW_SIDES, np.arange(len(rings) - 1)[:, None]
+    side = np.arange(n)
+    here, ahead = n * band + side, n * band + (side + 1) % n
+    return Part(
+        np.concatenate(points),
+        np.stack([here, ahead, ahead + n, here + n], axis=-1).reshape(-1, 4).astype(np.int32),
+        None,
+        np.concatenate(normals),
+        np.stack([here, ahead, ahead, here], axis=-1).reshape(-1, 4).astype(np.int32),
+    )
 
 
 def checker(half_tiles: int, tile: float) -> tuple[Part, NDArray[np.bool_]]:
@@ -169,19 +212,28 @@ def quaternions(rotations: FloatArray, before: FloatArray | None = None) -> Floa
 
 
 @cache
-def _unit_ball() -> tuple[FloatArray, IntArray]:
-    """A cube with every face cut in four and blown up: 26 corners, 48 triangles."""
-    corners = np.array([c for c in np.ndindex(3, 3, 3) if c != (1, 1, 1)], np.float64) - 1.0
-    number = {tuple(corner): index for index, corner in enumerate(corners.astype(int).tolist())}
+def _unit_ball(cuts: int) -> tuple[FloatArray, IntArray]:
+    """A cube with every face cut in ``cuts`` squared, an even number, and blown up.
+
+    Each square is cut along the diagonal that points to the middle of its face: 26 corners and 48
+    triangles for 2 cuts, 98 and 192 for 4.
+    """
+    half = cuts // 2
+    steps = range(-half, half + 1)
+    corners = [c for c in product(steps, steps, steps) if max(map(abs, c)) == half]
+    number = {corner: index for index, corner in enumerate(corners)}
     faces = []
-    for axis, side, a, b in product(range(3), (-1, 1), (-1, 0), (-1, 0)):
-        square = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)][::side]
-        turn = next(k for k, (p, q) in enumerate(square) if p == q == 0)  # cut through the middle
+    for axis, side, a, b in product(range(3), (-half, half), steps[:-1], steps[:-1]):
+        square = [(a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)][:: 1 if side > 0 else -1]
+        turn = min(range(4), key=lambda k: square[k][0] ** 2 + square[k][1] ** 2)
         p, q, r, s = (
-            number[tuple(np.roll((side, u, v), axis))] for u, v in square[turn:] + square[:turn]
+            number[tuple(np.roll((side, u, v), axis).tolist())]
+            for u, v in square[turn:] + square[:turn]
         )
         faces += [(p, q, r), (p, r, s)]
-    return corners / np.linalg.norm(corners, axis=1, keepdims=True), np.array(faces, np.int32)
+    # Angles instead of distances across a face: the squares come out about equally large.
+    points = np.tan(np.array(corners) * (0.25 * np.pi / half))
+    return points / np.linalg.norm(points, axis=1, keepdims=True), np.array(faces, np.int32)
 
 
 def _repeated(faces: IntArray, copies: int, stride: int) -> IntArray:

@@ -140,17 +140,20 @@ def track(result: Result, index: int) -> Track:
     return Track(index, robot, times, source, low, high, ball, bar)
 
 
-def placed(tracks: Sequence[Track], spacing: float | None) -> FloatArray:
+def placed(
+    tracks: Sequence[Track], spacing: float | None, solids: Sequence[FloatArray] = ()
+) -> FloatArray:
     """How far to move each robot to its place on a square grid [m], shape (R, 3); heights stay.
 
     Each robot starts in the middle of its cell. Without a spacing [m], the cells are as large as
     it takes that no two robots come near each other in any frame: robots that walk side by side
-    stand closer than robots that walk towards each other.
+    stand closer than robots that walk towards each other. Solid boxes (2, 3) [m], in the world of
+    each robot, do not come near another's robot or solids either.
     """
     start = np.stack([[t.low[0], t.high[0]] for t in tracks])
     footprint = float((start[:, 1, :2] - start[:, 0, :2]).max())
     if spacing is None:
-        spacing = _room(tracks, start) + _GAP * footprint
+        spacing = _room(tracks, start, solids) + _GAP * footprint
     return appearance.grid_offsets(start, spacing=spacing / footprint)
 
 
@@ -227,7 +230,7 @@ def _elements_of(elements: Elements, springs: NDArray[np.intp]) -> Elements:
     return elements.replace(**changes)
 
 
-def _room(tracks: Sequence[Track], start: FloatArray) -> float:
+def _room(tracks: Sequence[Track], start: FloatArray, solids: Sequence[FloatArray]) -> float:
     """The least distance of cells [m] at which no two boxes ever overlap.
 
     In each frame the cells have to be as far apart as the highest reach of any robot beyond its
@@ -236,6 +239,9 @@ def _room(tracks: Sequence[Track], start: FloatArray) -> float:
     middle = start.mean(axis=1)
     low = np.min([t.low - m for t, m in zip(tracks, middle, strict=True)], axis=0)
     high = np.max([t.high - m for t, m in zip(tracks, middle, strict=True)], axis=0)
+    for solid in solids:
+        low = np.minimum(low, solid[0] - middle.max(axis=0))
+        high = np.maximum(high, solid[1] - middle.min(axis=0))
     return float((high - low)[:, :2].max())
 
 

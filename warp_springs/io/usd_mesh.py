@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt  # noqa: TID253
 
 from warp_springs.io.usd_body import Body, IntArray
-from warp_springs.io.usd_geometry import TUBE_SIDES, Part, balls, skin, tubes
+from warp_springs.io.usd_geometry import Part, balls, skin, tubes
 from warp_springs.io.usd_stage import add_subsets, bind, constant_color, define_mesh
 from warp_springs.view import appearance
 
@@ -37,11 +37,15 @@ class Meshes(Body):
 
     def _pieces(self) -> Iterator[_Piece]:
         robot, rest, looks = self._robot, self._rest, self._looks
-        yield _Piece("masses", balls(rest, self._ball), looks.mass, appearance.MASS)
+        yield _Piece(
+            "masses", balls(rest, self._ball, self._detail.cuts), looks.mass, appearance.MASS
+        )
         if len(robot.faces):
             yield _Piece("skin", skin(rest, robot.faces), looks.skin, appearance.SKIN)
         if robot.n_springs:
-            yield _Piece("bars", tubes(rest, robot.springs, self._bar), looks.bars, None)
+            yield _Piece(
+                "bars", tubes(rest, robot.springs, self._bar, self._detail.sides), looks.bars, None
+            )
 
     def _add_meshes(self, parent: Sdf.Path) -> Iterator[tuple[UsdGeom.Mesh, Part]]:
         """Define the meshes in the rest pose."""
@@ -65,7 +69,7 @@ class Meshes(Body):
         }
 
     def _spread(self, colors: IntArray) -> IntArray:
-        return np.tile(colors, TUBE_SIDES)
+        return np.tile(colors, self._detail.sides)
 
 
 class MeshBody(Meshes):
@@ -78,7 +82,7 @@ class MeshBody(Meshes):
     def bytes_a_frame(self) -> int:
         """Memory of the samples of one frame."""
         points = sum(len(part.points) for _, part in self._meshes)
-        return _POINT_BYTES * points + 4 * TUBE_SIDES * self._robot.n_springs + 100
+        return _POINT_BYTES * points + 4 * self._detail.sides * self._robot.n_springs + 100
 
     def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
         for mesh, part in self._meshes:

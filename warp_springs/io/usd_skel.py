@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 # Only the exporter imports this module, when it has something to write.
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt  # noqa: TID253
 
-from warp_springs.io.usd_geometry import TUBE_SIDES
 from warp_springs.io.usd_mesh import Meshes
 from warp_springs.io.usd_stage import ints, vec3f
 
@@ -35,7 +34,7 @@ class SkelBody(Meshes):
     @property
     def bytes_a_frame(self) -> int:
         """Memory of the samples of one frame."""
-        return 12 * len(self._rest) + 4 * TUBE_SIDES * self._robot.n_springs + 100
+        return 12 * len(self._rest) + 4 * self._detail.sides * self._robot.n_springs + 100
 
     def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
         translations = self._motion.GetTranslationsAttr()
