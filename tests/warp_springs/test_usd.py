@@ -6,9 +6,16 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils, UsdValidation, Vt
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils
 
 import warp_springs as ws
+from tests.warp_springs.usd_reading import (
+    mass_positions,
+    robots_of,
+    skinned,
+    validation_errors,
+    world_extent,
+)
 from warp_springs.io import usd_geometry, usd_layout
 from warp_springs.view import appearance
 
@@ -34,54 +41,10 @@ def stage(exported):
     return Usd.Stage.Open(str(exported[0]))
 
 
-def robots_of(stage):
-    return list(stage.GetPrimAtPath("/World/Robots").GetChildren())
-
-
 def one_frame_of(robot, scene=None):
     """A run of two frames, a step apart."""
     dt = 1e-4
     return ws.Simulation([robot], scene or ws.Scene(ground=None), dt).run(dt, fps=1.0 / dt)
-
-
-def validation_errors(path):
-    registry = UsdValidation.ValidationRegistry()
-    context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
-    return [error.GetMessage() for error in context.Validate(Usd.Stage.Open(str(path)))]
-
-
-def skinned(stage, robot, time):
-    """World points of each skinned mesh by name, and the mass that each point follows."""
-    root = next(UsdSkel.Root(p) for p in Usd.PrimRange(robot) if p.IsA(UsdSkel.Root))
-    cache = UsdSkel.Cache()
-    cache.Populate(root, Usd.PrimDefaultPredicate)
-    found = {}
-    for prim in Usd.PrimRange(root.GetPrim()):
-        if not prim.IsA(UsdGeom.Mesh):
-            continue
-        query = cache.GetSkinningQuery(prim)
-        skeleton = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
-        transforms = cache.GetSkelQuery(skeleton).ComputeSkinningTransforms(time)
-        points = Vt.Vec3fArray(UsdGeom.Mesh(prim).GetPointsAttr().Get())
-        assert query.ComputeSkinnedPoints(transforms, points, time)
-        to_world = np.array(UsdGeom.XformCache(time).GetLocalToWorldTransform(skeleton.GetPrim()))
-        masses = np.array(UsdSkel.BindingAPI(prim).GetJointIndicesPrimvar().Get())
-        world = np.array(points, dtype=np.float64) @ to_world[:3, :3] + to_world[3, :3]
-        found[prim.GetName().rsplit("_", 1)[1]] = world, masses
-    return found
-
-
-def world_extent(robot, time):
-    """The corners of a robot's authored extent, in the world."""
-    root = next(UsdSkel.Root(p) for p in Usd.PrimRange(robot) if p.IsA(UsdSkel.Root))
-    box = Gf.Range3d(*(Gf.Vec3d(v) for v in root.GetExtentAttr().Get(time)))
-    return Gf.BBox3d(box, UsdGeom.XformCache(time).GetLocalToWorldTransform(root.GetPrim()))
-
-
-def mass_positions(stage, robot, time):
-    points, masses = skinned(stage, robot, time)["masses"]
-    count = np.bincount(masses)
-    return np.stack([np.bincount(masses, points[:, axis]) / count for axis in range(3)], axis=1)
 
 
 def assert_all_finite(stage):

@@ -108,8 +108,7 @@ def add_obstacles(
     ball = max(item.ball for item in tracks)
     Usd.ModelAPI(UsdGeom.Xform.Define(stage, OBSTACLES)).SetKind("group")
     for number, obstacle in enumerate(scene.obstacles):
-        points, triangles = obstacle_mesh(_smaller(obstacle, ball), box)
-        part = Part(points[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3))
+        part = _solid(_smaller(obstacle, ball), box)
         for place, offset in enumerate(np.unique(offsets, axis=0)):
             name = f"{type(obstacle).__name__}_{number}_{place}"
             mesh = define_mesh(stage, OBSTACLES.AppendChild(name), part)
@@ -118,6 +117,15 @@ def add_obstacles(
             Usd.ModelAPI(mesh).SetKind("component")
             constant_color(mesh, appearance.OBSTACLE)
             bind(mesh, looks.obstacle)
+
+
+def _solid(obstacle, box: FloatArray) -> Part:
+    """The mesh of an obstacle, flat faces but for a sphere; no vertex shared by flat ones."""
+    points, triangles = obstacle_mesh(obstacle, box)
+    if isinstance(obstacle, Sphere):
+        outward = (points - obstacle.center) / obstacle.radius
+        return Part(points, triangles, None, outward, triangles)
+    return Part(points[triangles].reshape(-1, 3), np.arange(triangles.size).reshape(-1, 3))
 
 
 def _smaller(obstacle, ball: float):
