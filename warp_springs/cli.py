@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 
+from warp_springs.commands.bench import BenchCommand
 from warp_springs.commands.demo import DemoCommand
 from warp_springs.commands.info import InfoCommand
 from warp_springs.commands.render import RenderCommand
@@ -11,6 +12,7 @@ from warp_springs.commands.render import RenderCommand
 __all__ = ["COMMANDS", "main"]
 
 COMMANDS = {
+    "bench": BenchCommand,
     "demo": DemoCommand,
     "info": InfoCommand,
     "render": RenderCommand,

@@ -1,10 +1,9 @@
 """The physics of warp_springs once more, written plainly: one robot, NumPy, float64.
 
-Nothing here is shared with the simulator, so that ``warp-springs bench`` and the tests can judge it
-by this. `Trial` repeats its discrete algorithm step by step,
-one statement per rule, so that the two must agree to rounding. `continuum` knows no algorithm
-at all: it integrates the differential equations with Runge-Kutta steps, so that the algorithm
-itself can be judged.
+Nothing here is shared with the simulator, so that ``warp-springs bench`` and the tests can judge
+it. `Trial` repeats its discrete algorithm step by step, one statement per rule, so that the two
+must agree to rounding. `continuum` knows no algorithm at all: it integrates the differential
+equations with Runge-Kutta steps, so that the algorithm itself can be judged.
 
 A robot is anything with the arrays of `warp_springs.Robot`, a scene anything with the fields of
 `warp_springs.Scene`. Units are SI, z is up, the ground is the plane z = 0.
@@ -190,8 +189,8 @@ class Trial:
                 forces[i, XY] = 0.0
                 velocities[i, XY] = 0.0
             else:
-                keep = 1.0 - ground.kinetic_friction * normal[i] / horizontal
-                forces[i, XY] *= max(0.0, keep)
+                lost = ground.kinetic_friction * normal[i]
+                forces[i, XY] *= 1.0 - lost / horizontal if horizontal > lost else 0.0
 
     # The classroom method: symplectic Euler.
 

@@ -28,6 +28,7 @@ def draw(rows: list[dict], title: str, path: Path) -> None:
 
     figure = Figure(figsize=(10, 6.4), layout="constrained")
     axes = figure.subplots()
+    axes.set(xscale="log", yscale="log", xlabel="robots", ylabel="springs per second")
     ends = []
     for name in dict.fromkeys(row["program"] for row in rows):
         best = {}
@@ -43,7 +44,6 @@ def draw(rows: list[dict], title: str, path: Path) -> None:
         axes.plot(sizes, rates, marker="o", markersize=3.5, **style)
         ends.append((rates[-1], name, style["color"]))
     _label(axes, ends, max(row["robots"] for row in rows))
-    axes.set(xscale="log", yscale="log", xlabel="robots", ylabel="springs per second")
     axes.set_xticks(sizes, [f"{size:,}" for size in sizes])
     axes.minorticks_off()
     axes.grid(which="major", color="#e5e7eb", linewidth=0.8)

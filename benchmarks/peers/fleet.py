@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from environments import CACHE, python_of
+from peers.environments import CACHE, python_of
 
 __all__ = ["LIBRARIES", "Fleet", "Program", "cores"]
 
@@ -23,6 +23,7 @@ class Program:
         name: Its name, with the library's.
         library: Whose it is.
         threads: Threads it runs on.
+        process: Threads of the process that it is in.
         precisions: Precisions it has.
         differs: How its physics differs from the others', or nothing.
     """
@@ -30,6 +31,7 @@ class Program:
     name: str
     library: str
     threads: int
+    process: int
     precisions: tuple[str, ...]
     differs: str
 
@@ -68,9 +70,10 @@ class Fleet:
         said = self._say(library, threads, do="describe")
         self.versions |= said["versions"]
         for name, facts in said["programs"].items():
-            if threads <= (facts["most_threads"] or threads):
-                precisions = tuple(facts["precisions"])
-                self.programs.append(Program(name, library, threads, precisions, facts["differs"]))
+            used = min(threads, facts["most_threads"] or threads)
+            if not any(p.name == name and p.threads == used for p in self.programs):
+                has = tuple(facts["precisions"]), facts["differs"]
+                self.programs.append(Program(name, library, used, threads, *has))
 
     def ask(self, program: Program, do: str, **request) -> dict:
         """What the program's process answers.
@@ -78,7 +81,7 @@ class Fleet:
         Raises:
             RuntimeError: It failed; with what it said.
         """
-        return self._say(program.library, program.threads, do=do, program=program.name, **request)
+        return self._say(program.library, program.process, do=do, program=program.name, **request)
 
     def drop(self) -> None:
         """Have all processes forget their programs."""
@@ -126,10 +129,10 @@ def _spawn(library: str, threads: int, python: Path) -> subprocess.Popen:
     names = ("OMP", "NUMBA", "OPENBLAS", "MKL")
     variables = {f"{name}_NUM_THREADS": str(threads) for name in names}
     # Threads that wait must not spin: they would take a core from whoever is measured next.
-    variables |= {"OMP_WAIT_POLICY": "passive", "PYTHONPATH": str(HERE)}
+    variables |= {"OMP_WAIT_POLICY": "passive", "PYTHONPATH": str(HERE.parent)}
     log = _log(library, threads)
     log.parent.mkdir(parents=True, exist_ok=True)
-    command = [str(python), str(HERE / "worker.py"), library, str(threads)]
+    command = [str(python), "-m", "peers.worker", library, str(threads)]
     allowed = cores()[:threads]
 
     def pin() -> None:

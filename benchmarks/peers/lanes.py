@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["Lanes"]
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from fleet import Fleet, Program
-from problem import Problem
-from programs.in_numpy import NumPy
+
+from peers.fleet import Fleet, Program
+from peers.problem import Problem
+from peers.programs.in_numpy import NumPy
 
 __all__ = ["ALLOWED", "FEATURES", "Row", "compare"]
 

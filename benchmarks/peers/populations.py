@@ -1,33 +1,19 @@
-"""The populations of the comparison: the classroom's cubes and lattices, made by warp_springs."""
+"""The populations of the comparison: those of ``warp-springs bench``, as plain arrays."""
 
 import numpy as np
-from problem import Problem
 
 import warp_springs as ws
+from peers.problem import Problem
+from warp_springs.bench.populations import DT, scene_of, variants
 
-__all__ = ["BODIES", "DT", "problem_of", "scene_of", "variants"]
+__all__ = ["BODIES", "population", "problem_of"]
 
-DT, OMEGA = 1e-4, 2.0 * np.pi
-BODIES = {"cube": (1, 1, 1), "lattice": (4, 2, 2)}  # voxels: 28 and 296 springs
-
-
-def scene_of(ground: bool = True) -> ws.Scene:
-    """The classroom's world: ground, its friction, 0.9999 of the velocity kept each step."""
-    plane = ws.Ground(friction="course") if ground else None
-    return ws.Scene(ground=plane, damping=ws.damping_rate(0.9999, DT))
+BODIES = ("cube", "lattice")  # 28 and 296 springs
 
 
-def variants(body: str, robots: int, seed: int = 0) -> ws.Variants:
-    """Robots that land in the first milliseconds, every spring breathing in a phase of its own."""
-    one = ws.shapes.lattice(*BODIES[body]).moved((0.0, 0.0, 0.0005))
-    rng = np.random.default_rng(seed)
-    shape = (robots, one.n_springs)
-    return one.variants(
-        stiffness=one.stiffness * rng.uniform(0.8, 1.2, shape),
-        amplitude=one.rest_length * rng.uniform(0.05, 0.1, shape),
-        phase=rng.uniform(0.0, 2.0 * np.pi, shape),
-        omega=np.full(robots, OMEGA),
-    )
+def population(body: str, robots: int) -> Problem:
+    """Robots that land in the first milliseconds on the classroom's ground, breathing."""
+    return problem_of(variants(body, robots), scene_of())
 
 
 def problem_of(robots: ws.Variants, scene: ws.Scene) -> Problem:

@@ -5,24 +5,16 @@ import platform
 from pathlib import Path
 
 import numpy as np
-from fleet import Fleet, cores
-from measure import ALLOWED, FEATURES, Row
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["as_json", "processor", "tables", "write"]
+from peers.fleet import Fleet, cores
+from peers.measure import ALLOWED, FEATURES, Row
+from warp_springs.bench.machine import processor
+
+__all__ = ["as_json", "tables", "write"]
 
 OURS = "warp_springs"
-
-
-def processor() -> str:
-    """The name of the processor."""
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 def tables(console: Console, title: str, rows: list[Row]) -> None:
@@ -30,11 +22,12 @@ def tables(console: Console, title: str, rows: list[Row]) -> None:
     names = list(dict.fromkeys(row.program.name for row in rows))
     counts = sorted({row.program.threads for row in rows})
     found = {(row.program.name, row.program.threads): row for row in rows}
-    table = Table(title=title, title_justify="left")
+    console.print(f"\n[bold]{title}[/]; ratio: how many times faster warp_springs is")
+    table = Table()
     table.add_column("program", no_wrap=True)
     for count in counts:
         table.add_column(f"{_cores(count)}\nM springs/s", justify="right")
-        table.add_column("warp_springs\nis faster", justify="right")
+        table.add_column("ratio", justify="right")
     table.add_column("differs\nby [m]", justify="right")
     table.add_column("first\nuse [s]", justify="right")
     for name in sorted(names, key=lambda name: -_fastest(name, rows)):

@@ -16,14 +16,19 @@ The sweep does so for populations of 1 to 8,192 and draws benchmarks/figures/pee
 """
 
 import argparse
+import sys
 from pathlib import Path
 
-import report
-from figure import draw
-from fleet import LIBRARIES, Fleet, cores
-from measure import FEATURES, compare
-from populations import BODIES, problem_of, scene_of, variants
 from rich.console import Console
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from peers import report
+from peers.figure import draw
+from peers.fleet import LIBRARIES, Fleet, cores
+from peers.measure import FEATURES, compare
+from peers.populations import BODIES, population
+from warp_springs.bench.machine import processor
 
 FIGURES = Path(__file__).parents[1] / "figures"
 SIZES = (1, 16, 128, 1024, 8192)
@@ -45,7 +50,7 @@ def main() -> None:
             if "sweep" in args.part:
                 lines = sweep(console, fleet, args, status.update)
                 report.write(args.json, fleet, sweep=lines)
-                title = f"Cubes of 28 springs, float32, {report.processor()}, {len(cores())} cores"
+                title = f"Cubes of 28 springs, float32, {processor()}, {len(cores())} cores"
                 draw(lines, f"{title}\n{FEATURES}", args.figure)
                 console.print(f"wrote {args.figure}")
         finally:
@@ -61,7 +66,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="small populations, few rounds")
     parser.add_argument("--part", nargs="+", choices=("table", "sweep"), default=["table", "sweep"])
     parser.add_argument("--library", nargs="+", choices=LIBRARIES, default=LIBRARIES)
-    parser.add_argument("--body", nargs="+", choices=tuple(BODIES), default=tuple(BODIES))
+    parser.add_argument("--body", nargs="+", choices=BODIES, default=BODIES)
     parser.add_argument("--precision", nargs="+", default=("float32", "float64"))
     parser.add_argument("--threads", type=int, nargs="+", default=sorted({1, len(cores())}))
     parser.add_argument("--robots", type=int, default=1024, help="population of the table")
@@ -79,7 +84,7 @@ def arguments() -> argparse.Namespace:
 def say_who(console: Console, fleet: Fleet) -> None:
     """Name the machine, the versions, and who is missing."""
     versions = ", ".join(f"{name} {version}" for name, version in fleet.versions.items())
-    console.print(f"{report.processor()}, {len(cores())} cores; {versions}")
+    console.print(f"{processor()}, {len(cores())} cores; {versions}")
     console.print(FEATURES)
     for library, reason in fleet.failed.items():
         console.print(f"{library} does not take part: {reason}")
@@ -89,7 +94,7 @@ def table(console: Console, fleet: Fleet, args, say) -> list[dict]:
     """Compare on each body in each precision."""
     lines = []
     for body in args.body:
-        problem = problem_of(variants(body, args.robots), scene_of())
+        problem = population(body, args.robots)
         for precision in args.precision:
             rows = compare(fleet, problem, precision, 500, args.rounds, args.seconds, say)
             title = f"{args.robots:,} {body}s of {problem.n_springs} springs, {precision}"
@@ -102,7 +107,7 @@ def sweep(console: Console, fleet: Fleet, args, say) -> list[dict]:
     """Compare cubes in float32 for populations of all sizes."""
     lines = []
     for robots in args.sizes:
-        problem = problem_of(variants("cube", robots), scene_of())
+        problem = population("cube", robots)
         rounds, seconds = min(args.rounds, 3), args.seconds / 2
         rows = compare(fleet, problem, "float32", 200, rounds, seconds, say)
         report.tables(console, f"{robots:,} cubes of 28 springs, float32", rows)

@@ -1,6 +1,6 @@
 """One library's process: makes, checks and times programs as it is told, a JSON line at a time.
 
-    python worker.py LIBRARY THREADS
+    python -m peers.worker LIBRARY THREADS
 
 Reads requests from standard input and answers each with a line on standard output; whatever the
 library itself prints goes to standard error.
@@ -13,7 +13,8 @@ import sys
 import time
 
 import numpy as np
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["Worker", "main"]
 
@@ -22,7 +23,7 @@ class Worker:
     """The programs of one library by name, and what can be asked of them."""
 
     def __init__(self, library: str, threads: int) -> None:
-        self._module = importlib.import_module(f"programs.in_{library}")
+        self._module = importlib.import_module(f"peers.programs.in_{library}")
         self._threads = threads
         self._made = {}
 

@@ -9,7 +9,8 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "Limit", "Plain", "build", "versions"]
 
@@ -73,9 +74,10 @@ class _Compiled:
     """A simulation in one of the libraries."""
 
     name: str
+    flags: tuple[str, ...] = ()
 
     def __init__(self, problem: Problem, precision: str, threads: int) -> None:
-        library = ctypes.CDLL(str(build(self.name)))
+        library = ctypes.CDLL(str(build(self.name, self.flags)))
         arrays = {name: np.ascontiguousarray(getattr(problem, name)) for name in DOUBLES}
         arrays |= {"ends": problem.springs, "omega": problem.omega}
         numbers = ("dt", "keep", "ground_stiffness", "static_friction", "kinetic_friction")

@@ -5,7 +5,8 @@ import functools
 import jax
 import jax.numpy as jnp
 import numpy as np
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "JaxArrays", "JaxUnrolled", "versions"]
 

@@ -10,7 +10,8 @@ frictions.
 import newton
 import numpy as np
 import warp as wp
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "NewtonLoop", "NewtonTuned", "versions"]
 

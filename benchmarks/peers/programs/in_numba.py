@@ -2,9 +2,10 @@
 
 import numba
 import numpy as np
-from lanes import Lanes
 from numba import njit, prange
-from problem import Problem
+
+from peers.lanes import Lanes
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "NumbaLanes", "NumbaLoops", "versions"]
 

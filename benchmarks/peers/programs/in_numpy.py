@@ -1,7 +1,8 @@
 """NumPy, vectorised over robots and springs, as its users ordinarily write it."""
 
 import numpy as np
-from problem import Problem
+
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "NumPy", "versions"]
 

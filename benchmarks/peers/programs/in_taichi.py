@@ -2,8 +2,9 @@
 
 import numpy as np
 import taichi as ti
-from lanes import Lanes
-from problem import Problem
+
+from peers.lanes import Lanes
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "TaichiLanes", "TaichiLoops", "versions"]
 

@@ -1,19 +1,12 @@
 """Warp as everybody writes it first: two kernels a step, forces by atomic additions."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
+import two_kernels
 import warp
-from problem import Problem
 
 import warp_springs as ws
-
-from .in_warp_springs import robots_of, scene_of
-
-sys.path.append(str(Path(__file__).parents[2]))
-
-import two_kernels
+from peers.problem import Problem
+from peers.programs.in_warp_springs import robots_of, scene_of
 
 __all__ = ["PROGRAMS", "WarpKernels", "versions"]
 

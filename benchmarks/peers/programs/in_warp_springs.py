@@ -2,9 +2,9 @@
 
 import numpy as np
 import warp
-from problem import Problem
 
 import warp_springs as ws
+from peers.problem import Problem
 
 __all__ = ["PROGRAMS", "WarpSprings", "robots_of", "scene_of", "versions"]
 

@@ -1,0 +1,1 @@
+"""warp_springs beside every alternative; the command is ``run.py``."""

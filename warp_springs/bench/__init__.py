@@ -1,0 +1,1 @@
+"""What ``warp-springs bench`` measures: cases, their check against the reference, their speed."""
