@@ -80,9 +80,8 @@ class Elsewhere(Trial):
 def test_a_wrong_case_gets_no_speed_and_exit_code_1(tmp_path, monkeypatch):
     monkeypatch.setattr(measure, "Trial", Elsewhere)
     monkeypatch.setattr(measure, "_REFERENCES", {})
-    command = BenchCommand(
-        section=("population",), sizes=(2,), quick=True, json=tmp_path / "b.json"
-    )
+    out = tmp_path / "b.json"
+    command = BenchCommand(section=("population",), sizes=(2,), quick=True, json=out)
     console = Console(record=True, width=100, file=(tmp_path / "screen").open("w"))
     with pytest.raises(RuntimeError, match="1 of 1 rows are wrong"):
         command.run(console)
