@@ -8,6 +8,7 @@ from warp_springs.commands.bench import BenchCommand
 from warp_springs.commands.demo import DemoCommand
 from warp_springs.commands.info import InfoCommand
 from warp_springs.commands.render import RenderCommand
+from warp_springs.commands.run import RunCommand
 
 __all__ = ["COMMANDS", "main"]
 
@@ -16,11 +17,15 @@ COMMANDS = {
     "demo": DemoCommand,
     "info": InfoCommand,
     "render": RenderCommand,
+    "run": RunCommand,
 }
 
 
 def main() -> None:
-    """Entry point of ``warp-springs``: exit code 0, 1 (failed), 2 (bad usage) or 130 (Ctrl-C)."""
+    """Entry point of ``warp-springs``.
+
+    Exit code 0, 1 (failed), 2 (bad usage), 3 (a robot was stopped) or 130 (Ctrl-C).
+    """
     import tyro
     from rich.console import Console
 
@@ -33,11 +38,11 @@ def main() -> None:
 
     try:
         quiet()
-        command.run(Console())
+        sys.exit(command.run(Console()) or 0)
     except KeyboardInterrupt:
         sys.exit(130)
     except (OSError, ValueError, RuntimeError) as error:
-        print(f"warp-springs: {error}", file=sys.stderr)
+        print(f"warp-springs: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(1)
 
 

@@ -5,6 +5,8 @@ that names the file and the key.
 """
 
 from warp_springs.config.bodies import SHAPES, AnyBody, AnyShape, BodyConfig
+from warp_springs.config.files import MOST_SHOWN, OUTPUTS, RecordConfig, SceneFile, load_scene
+from warp_springs.config.robots import RobotConfig
 from warp_springs.config.scenes import GroundConfig, SceneConfig
 from warp_springs.config.section import Section, Triple, one_of
 from warp_springs.config.simulation import SimulationConfig
@@ -19,17 +21,23 @@ from warp_springs.config.text import (
 )
 
 __all__ = [
+    "MOST_SHOWN",
+    "OUTPUTS",
     "SHAPES",
     "AnyBody",
     "AnyShape",
     "BodyConfig",
     "ConfigError",
     "GroundConfig",
+    "RecordConfig",
+    "RobotConfig",
     "SceneConfig",
+    "SceneFile",
     "Section",
     "SimulationConfig",
     "Triple",
     "dump",
+    "load_scene",
     "one_of",
     "parse",
     "parse_settings",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from warp_springs import shapes
-from warp_springs.config.section import Section, Triple, one_of
+from warp_springs.config.section import BesideFile, Section, Triple, one_of
 from warp_springs.robot import Robot
 
 __all__ = ["SHAPES", "AnyBody", "AnyShape", "BodyConfig", "MeshConfig", "SavedConfig"]
@@ -170,7 +169,7 @@ class MeshConfig(BodyConfig):
     """A mesh file of any format that `read_mesh` reads, on request filled."""
 
     shape: Literal["mesh"]
-    path: Path
+    path: BesideFile
     """The file, relative to that of the configuration."""
     scale: float | str = 1.0
     """Metres in a unit of the file, or "mm", "cm", "in", ..."""
@@ -206,7 +205,7 @@ class SavedConfig(Section):
     """A robot that `Robot.save` wrote, as it is."""
 
     shape: Literal["saved"]
-    path: Path
+    path: BesideFile
     """The file, relative to that of the configuration."""
 
     def build(self) -> Robot:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_serializer, field_validator, model_validator
 
 from warp_springs import scene, surfaces
-from warp_springs.config.section import Section, Triple, one_of
+from warp_springs.config.section import BesideFile, Section, Triple, one_of
 from warp_springs.materials import FRICTION
 
 __all__ = ["GroundConfig", "SceneConfig"]
@@ -97,7 +96,7 @@ class HeightFieldConfig(Obstacle):
     """Distance of neighbouring grid points [m]."""
     heights: tuple[tuple[float, ...], ...] | None = None
     """[m]; rows run along x."""
-    picture: Path | None = None
+    picture: BesideFile | None = None
     """A file, relative to that of the configuration."""
     lowest: float = 0.0
     highest: float = 0.1
@@ -171,6 +170,10 @@ class SceneConfig(Section):
     @classmethod
     def _ground_may_be_false(cls, value: Any) -> Any:
         return {True: {}, False: None}[value] if isinstance(value, bool) else value
+
+    @field_serializer("ground")
+    def _no_ground_is_false(self, value: GroundConfig | None) -> Any:
+        return False if value is None else value.model_dump()
 
     def build(self) -> scene.Scene:
         """Make the scene."""

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Annotated, Any, Union
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
 
-__all__ = ["Section", "Triple", "one_of"]
+__all__ = ["BesideFile", "Section", "Triple", "one_of"]
 
 Triple = tuple[float, float, float]
+
+
+def _beside(path: Path, info: ValidationInfo) -> Path:
+    folder = (info.context or {}).get("folder")
+    return path if folder is None else (folder / path).resolve()
+
+
+BesideFile = Annotated[Path, AfterValidator(_beside)]
+"""The path of a file, relative to the folder of the configuration that names it."""
 
 
 class Section(BaseModel):

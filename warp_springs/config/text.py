@@ -43,6 +43,7 @@ def parse(
     source: str,
     overrides: Mapping[str, Any] | None = None,
     kept: Callable[[str, Any], Container[str]] = lambda key, value: (),
+    folder: Path | None = None,
 ) -> Model:
     """Read TOML text.
 
@@ -53,6 +54,7 @@ def parse(
         overrides: Dotted key -> value, e.g. {"scene.damping": 0.1, "robots.0.body.edge": 0.2};
             replaces what was read. A new kind of a section starts from its defaults.
         kept: Which keys of a section survive when a key, dotted, gives it another kind.
+        folder: Where the files lie that it names by relative paths; where we are if left out.
 
     Raises:
         ConfigError: It is no TOML, or does not describe such a thing.
@@ -63,13 +65,15 @@ def parse(
         raise ConfigError(f"{source} is not valid TOML: {error}") from None
     for key, value in (overrides or {}).items():
         _override(data, key, value, kept)
-    return validate(model, data, source)
+    return validate(model, data, source, folder)
 
 
-def validate(model: type[Model], data: Mapping[str, Any], source: str) -> Model:
-    """Check a configuration given as nested tables. Raises ConfigError like `parse`."""
+def validate(
+    model: type[Model], data: Mapping[str, Any], source: str, folder: Path | None = None
+) -> Model:
+    """Check a configuration given as nested tables. Arguments and errors as of `parse`."""
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         raise ConfigError(f"{source}: {_explain(error, model, data)}") from None
 

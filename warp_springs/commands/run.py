@@ -1,0 +1,47 @@
+"""``warp-springs run SCENE.toml``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["RunCommand"]
+
+
+@dataclass(frozen=True)
+class RunCommand:
+    """Simulate a scene file: robots, world, simulation and recording in one TOML file.
+
+    Writes what its table [record] asks for: by default NAME.npz (the result, for ws.Result.load),
+    NAME.usdc (animation), NAME.png (the end), NAME_energies.png; and always NAME_parameters.md
+    (every parameter, and what came of it) and NAME.toml (the scene with all its defaults). Exits
+    with 3 if a robot had to be stopped.
+
+    Begin with a copy of a demonstration: warp-springs demo bouncing-cube --toml > scene.toml
+
+    Any key can be set, for example
+    warp-springs run scene.toml --set robot.body.edge=0.2 scene.damping=1 record.fps=30
+    """
+
+    scene: Annotated[Positional[Path], arg(metavar="SCENE.toml")]
+    """The scene."""
+    out: Path = Path("out")
+    """Folder to write to; made if it is missing."""
+    set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()
+    """Keys of the scene by their full names, values as in TOML."""
+
+    def run(self, console: Console) -> int:
+        """Simulate, write, and say what was written."""
+        from warp_springs.commands.scenes import simulated, write_and_say
+        from warp_springs.config import load_scene, parse_settings
+
+        config = load_scene(self.scene, parse_settings(self.set))
+        result = simulated(config, console)
+        write_and_say(config, result, self.out, console)
+        return 3 if result.status.any() else 0

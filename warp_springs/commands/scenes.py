@@ -1,0 +1,52 @@
+"""What ``run`` and ``demo`` have in common: simulating a scene file with everything to see."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from warp_springs.config import SceneFile
+    from warp_springs.result import Result
+
+__all__ = ["print_rows", "simulated", "write_and_say"]
+
+
+def simulated(config: SceneFile, console: Console) -> Result:
+    """Simulate a scene file with a bar that shows the progress."""
+    from rich.progress import Progress
+
+    console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("simulating", total=1.0)
+        return config.run(lambda done: bar.update(task, completed=done))
+
+
+def write_and_say(config: SceneFile, result: Result, folder: Path, console: Console) -> list[Path]:
+    """Write the files of a run, print what came of it and where everything is."""
+    from warp_springs.outputs import write_outputs
+    from warp_springs.parameters import outcome
+
+    with console.status("writing"):
+        paths = write_outputs(config, result, folder)
+    print_rows(console, outcome(result))
+    print("wrote")
+    for path in paths:
+        print(f"  {path}")
+    sys.stdout.flush()
+    return paths
+
+
+def print_rows(console: Console, rows: list[tuple[str, str]], title: str | None = None) -> None:
+    """Print a table with two columns."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(name, value)
+    console.print(table, highlight=False)
