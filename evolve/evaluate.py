@@ -167,6 +167,7 @@ class Evaluator:
             precision=settings.precision if precision is None else precision,
             integrator=settings.integrator,
             device=settings.device,
+            layout=settings.layout,
             threads=settings.threads,
         )
 

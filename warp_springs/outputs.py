@@ -34,10 +34,11 @@ def write_outputs(config: SceneFile, result: Result, folder: Path) -> list[Path]
     record = config.record
     look = {"names": {i: config.names[i] for i in result.recorded}, "grid": record.grid}
     shown = list(result.recorded[: ws.config.MOST_SHOWN])
+    labels = [config.names[i] for i in shown] if len(shown) > 1 else None
     writers: dict[str, tuple[str, Callable[[Path], object]]] = {
         "result": (".npz", result.save),
         "usd": (".usdc", lambda path: ws.export_usd(result, path, color=record.color, **look)),
-        "picture": (".png", lambda path: ws.render(result, path, robots=shown)),
+        "picture": (".png", lambda path: ws.render(result, path, robots=shown, labels=labels)),
         "energies": ("_energies.png", lambda path: _save(energy_figure(config, result), path)),
         "page": (
             ".html",

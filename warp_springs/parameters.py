@@ -76,8 +76,9 @@ _DIMENSIONLESS = ("water.density",)
 def parameters(config: SceneFile, result: Result) -> list[Row]:
     """Every parameter of a scene file, and the figures of the robots that it makes."""
     from warp_springs import __version__
+    from warp_springs.config import tables
 
-    data = config.model_dump(mode="json", exclude_none=True, exclude={"name", "about"})
+    data = {k: v for k, v in tables(config).items() if k not in ("name", "about")}
     rows = list(_flat(data, ()))
     rows += _robots(config, result)
     rows += [

@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_springs.commands.progress import progress
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -17,12 +19,9 @@ __all__ = ["print_rows", "simulated", "write_and_say"]
 
 def simulated(config: SceneFile, console: Console) -> Result:
     """Simulate a scene file with a bar that shows the progress."""
-    from rich.progress import Progress
-
     console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("simulating", total=1.0)
-        return config.run(lambda done: bar.update(task, completed=done))
+    with progress(console, "simulating") as advance:
+        return config.run(advance)
 
 
 def write_and_say(config: SceneFile, result: Result, folder: Path, console: Console) -> list[Path]:

@@ -17,6 +17,7 @@ from warp_springs.config.text import (
     parse_settings,
     read_text,
     suggest,
+    tables,
     validate,
 )
 
@@ -43,5 +44,6 @@ __all__ = [
     "parse_settings",
     "read_text",
     "suggest",
+    "tables",
     "validate",
 ]

@@ -18,6 +18,8 @@ class SimulationConfig(Section):
     """Time step [s], or "auto": for each robot half a millisecond, halved until it is stable."""
     precision: Literal["float64", "float32", "mixed"] = "float64"
     integrator: Literal["chin4", "leapfrog", "euler"] = "chin4"
+    layout: Literal["auto", "lanes", "block", "flat"] = "auto"
+    """How robots are laid out for the processor."""
     device: str = "cpu"
     threads: int | None = Field(None, ge=1)
     """Processor cores to use, all when left out. The results do not depend on it."""

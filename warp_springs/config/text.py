@@ -16,7 +16,16 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["ConfigError", "dump", "parse", "parse_settings", "read_text", "suggest", "validate"]
+__all__ = [
+    "ConfigError",
+    "dump",
+    "parse",
+    "parse_settings",
+    "read_text",
+    "suggest",
+    "tables",
+    "validate",
+]
 
 Model = TypeVar("Model", bound=BaseModel)
 _KINDS = ("shape", "type")
@@ -94,7 +103,19 @@ def parse_settings(settings: Iterable[str]) -> dict[str, Any]:
 
 def dump(config: BaseModel) -> str:
     """Write a configuration as TOML that `parse` reads back unchanged."""
-    return "\n".join(_lines(config.model_dump(mode="json", exclude_none=True), ())) + "\n"
+    return "\n".join(_lines(tables(config), ())) + "\n"
+
+
+def tables(config: BaseModel) -> dict[str, Any]:
+    """A configuration as nested tables of what TOML can hold; what is None is left out."""
+    # pydantic would leave out what is None but written as something else, too.
+    return _without_none(config.model_dump(mode="json"))
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value
 
 
 def suggest(word: str, known: Iterable[str]) -> str:
