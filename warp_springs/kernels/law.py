@@ -174,9 +174,13 @@ auto drag_flow = [=](Vec& v, real w, scalar h) __attribute__((always_inline)) {
     v.x *= factor; v.y *= factor; v.z *= factor;
 };
 
-// Upward force of the ground on a mass at height z.
+// Force of an elastic surface of stiffness k on a mass at height z over it; upward force of the
+// ground.
+auto surface_force = [=](real z, real k) __attribute__((always_inline)) -> real {
+    return select(z < zero, z * -k, zero);
+};
 auto ground_force = [=](real z) __attribute__((always_inline)) -> real {
-    return select(z < zero, z * -ground_stiffness, zero);
+    return surface_force(z, zero + ground_stiffness);
 };
 
 // Coulomb's law for one step: a normal impulse `hold` (per unit of mass) stops a tangential
@@ -207,20 +211,22 @@ auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n)
 };
 
 // Height z and vertical velocity u under gravity and the ground over one drift, by `substeps`
-// velocity-Verlet steps; returns the impulse of the ground per unit of mass.
+// velocity-Verlet steps; returns the impulse of the ground per unit of mass. The kicks that meet
+// between two steps are one: each step waits for the one before, so a step has few operations.
 auto contact_flow = [=](real& z, real& u, real w, int substeps)
         __attribute__((always_inline)) -> real {
-    const scalar h = span / scalar(substeps), half_h = h * scalar(0.5);
-    real push = ground_force(z) * w, impulse = zero;
+    const scalar h = span / scalar(substeps), fall = gravity_z * h, half = scalar(0.5);
+    const real k = w * (ground_stiffness * h);
+    real push = surface_force(z, k), impulse = push * half;
+    u += (push + fall) * half;
     for (int s = 0; s < substeps; ++s) {
-        u += (push + gravity_z) * half_h;
-        impulse += push;
         z += u * h;
-        push = ground_force(z) * w;
-        u += (push + gravity_z) * half_h;
+        push = surface_force(z, k);
+        u = (u + fall) + push;
         impulse += push;
     }
-    return impulse * half_h;
+    u -= (push + fall) * half;
+    return impulse - push * half;
 };
 
 // Kicks and drifts. The springs kick; a drift of `span` seconds moves by the velocity, and gravity
