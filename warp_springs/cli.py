@@ -6,6 +6,7 @@ import sys
 
 from warp_springs.commands.bench import BenchCommand
 from warp_springs.commands.demo import DemoCommand
+from warp_springs.commands.export import ExportCommand
 from warp_springs.commands.info import InfoCommand
 from warp_springs.commands.render import RenderCommand
 from warp_springs.commands.run import RunCommand
@@ -15,6 +16,7 @@ __all__ = ["COMMANDS", "main"]
 COMMANDS = {
     "bench": BenchCommand,
     "demo": DemoCommand,
+    "export": ExportCommand,
     "info": InfoCommand,
     "render": RenderCommand,
     "run": RunCommand,
