@@ -36,9 +36,11 @@ class Evaluator:
         self.simulation = config.simulation
         self.scene = config.scene.build()
         self.streams = Streams(config.seed)
-        self.settle = config.task.settle * config.encoding.period
+        self.period = config.encoding.period
+        """Time of a cycle of the muscles [s]."""
+        self.settle = config.task.settle * self.period
         """Settling time [s]."""
-        self.measure = config.task.measure * config.encoding.period
+        self.measure = config.task.measure * self.period
         """Time of the measurement [s]."""
 
     def __call__(self, robots: Sequence[ws.Robot]) -> Scores:
@@ -124,9 +126,12 @@ class Evaluator:
         survives = (kept[0] >= settings.threshold) & (kept[1] >= settings.threshold)
         return SecondLook(dt, halved, kept[0], usual, kept[1], survives)
 
-    def film(self, robots: Sequence[ws.Robot], fps: float = 30.0) -> ws.Result:
-        """Simulate a whole trial and record every frame of every robot."""
-        return self._simulate(robots).run(self.settle + self.measure, fps=fps)
+    def film(
+        self, robots: Sequence[ws.Robot], fps: float = 30.0, least_cycles: float = 0.0
+    ) -> ws.Result:
+        """Simulate a whole trial, or more cycles if asked, and record all frames of all robots."""
+        duration = max(self.settle + self.measure, least_cycles * self.period)
+        return self._simulate(robots).run(duration, fps=fps)
 
     def _fitness(self, trial: Trial) -> np.ndarray:
         """Fitness of every robot, shape (N,); NaN for those who were stopped."""

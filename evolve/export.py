@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,22 +15,31 @@ from evolve.store import Finalist, Store
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ZOO_SIZE", "crown", "export"]
+__all__ = ["ZOO_SIZE", "crown", "export", "label", "trial"]
 
+FILM_CYCLES = 3
+"""Cycles of the muscles that an animation shows at least."""
 ZOO_SIZE = 9
 """Robots in the zoo, unless told otherwise."""
 
 
-def export(run: Run, best: int = ZOO_SIZE) -> tuple[list[Finalist], list[Path]]:
+def export(
+    run: Run,
+    best: int = ZOO_SIZE,
+    film: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[list[Finalist], list[Path]]:
     """Crown the champion of a run; show it, and the zoo of the best.
 
-    Writes champion.usdc and zoo.usdc, animations of the whole trial, and zoo.png, its end. Whoever
-    does not survive the second look comes after all who do; where nobody survives there is no
-    champion, and no champion.usdc.
+    Writes champion.usdc and zoo.usdc, animations of the whole trial, and zoo.png, its end; films
+    of both if asked. Whoever does not survive the second look comes after all who do; where nobody
+    survives there is no champion, and no champion.usdc.
 
     Args:
         run: A run in which somebody has a fitness.
         best: How many different individuals are shown in the zoo.
+        film: "mp4" or "webp": write champion and zoo as films too.
+        progress: Called with the share of the films that is drawn, 0 ... 1.
 
     Returns:
         Everybody who was looked at twice, the champion first if there is one, and the paths of
@@ -39,10 +48,22 @@ def export(run: Run, best: int = ZOO_SIZE) -> tuple[list[Finalist], list[Path]]:
     Raises:
         RunError: Nobody has a fitness.
         StoreError: Another process exports this run.
+        RuntimeError: A film cannot be written for want of ffmpeg.
     """
     with run.exporting(), Store.open(run.record_path, write=True) as store:
         finalists = crown(run, store, best)
-        return finalists, _show(run, store, finalists[:best])
+        zoo = finalists[:best]
+        motion = trial(run, store, zoo)
+        paths = _show(run, motion, zoo)
+        if film is not None:
+            paths += _film(run, motion, zoo, film, progress or (lambda _: None))
+        return finalists, paths
+
+
+def trial(run: Run, store: Store, zoo: Sequence[Finalist]) -> ws.Result:
+    """Simulate the whole trial of some finalists again, three cycles at least, with all frames."""
+    robots = _robots(run, store, [member.id for member in zoo])
+    return Evaluator(run.config).film(robots, least_cycles=FILM_CYCLES)
 
 
 def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
@@ -62,21 +83,51 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     return store.finalists()
 
 
-def _show(run: Run, store: Store, zoo: Sequence[Finalist]) -> list[Path]:
+def _show(run: Run, motion: ws.Result, zoo: Sequence[Finalist]) -> list[Path]:
     """Write the animations and the picture of the zoo; the champion is the first of it."""
     import warp_springs as ws
 
-    film = Evaluator(run.config).film(_robots(run, store, [member.id for member in zoo]))
     names = {place: f"robot_{member.id}" for place, member in enumerate(zoo)}
     notes = {place: _notes(run, member) for place, member in enumerate(zoo)}
     champion, *others = (run.directory / f for f in ("champion.usdc", "zoo.usdc", "zoo.png"))
     if zoo[0].survives:
-        ws.export_usd(film, champion, robots=[0], names={0: names[0]}, custom_data={0: notes[0]})
+        ws.export_usd(motion, champion, robots=[0], names={0: names[0]}, custom_data={0: notes[0]})
     else:
         champion.unlink(missing_ok=True)
-    ws.export_usd(film, others[0], names=names, custom_data=notes)
-    ws.render(film, others[1], labels=[_label(member) for member in zoo])
+    ws.export_usd(motion, others[0], names=names, custom_data=notes)
+    ws.render(motion, others[1], layout="panel", labels=[label(member) for member in zoo])
     return [champion, *others] if zoo[0].survives else others
+
+
+def _film(
+    run: Run,
+    motion: ws.Result,
+    zoo: Sequence[Finalist],
+    suffix: str,
+    progress: Callable[[float], None],
+) -> list[Path]:
+    """Film the champion, if there is one, and the zoo, a tile for each."""
+    import warp_springs as ws
+
+    champion, panel = (run.directory / f"{name}.{suffix}" for name in ("champion", "zoo"))
+    ws.render(
+        motion,
+        panel,
+        layout="panel",
+        labels=[label(member) for member in zoo],
+        progress=lambda done: progress(0.5 * done),
+    )
+    if not zoo[0].survives:
+        champion.unlink(missing_ok=True)
+        return [panel]
+    ws.render(
+        motion,
+        champion,
+        robots=0,
+        caption=label(zoo[0]),
+        progress=lambda done: progress(0.5 + 0.5 * done),
+    )
+    return [champion, panel]
 
 
 def _robots(run: Run, store: Store, ids: Sequence[int]) -> Sequence[ws.Robot]:
@@ -84,7 +135,8 @@ def _robots(run: Run, store: Store, ids: Sequence[int]) -> Sequence[ws.Robot]:
     return encoding.express(encoding.from_bytes(store.genomes(ids)))
 
 
-def _label(member: Finalist) -> str:
+def label(member: Finalist) -> str:
+    """What is written beside a finalist in a picture."""
     return f"#{member.id}   {member.fitness:.2f}" + ("" if member.survives else "   demoted")
 
 

@@ -33,7 +33,7 @@ from evolve.toml import dump, load, parse, validate
 __all__ = ["Progress", "Run", "Session", "create_seeds", "evolve_together", "open_all"]
 
 RECORD = "run.sqlite"
-LEFTOVERS = (".*.part", ".usd-*")
+LEFTOVERS = (".draft-*", ".usd-*")
 """What a process that is killed while it draws leaves beside the files of the run."""
 
 

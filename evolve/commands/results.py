@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -43,18 +43,23 @@ class Export:
     """Simulate the best robots of a run again and write them as animations.
 
     Writes champion.usdc, zoo.usdc with the best different individuals side by side, and zoo.png to
-    the folder of the run. The best are first simulated again, at half the time step in float64 and
-    from perturbed starts; the champion is the fittest who keeps its fitness there, and whoever
-    does not comes after all who do.
+    the folder of the run, and films of both if asked. The best are first simulated again, at half
+    the time step in float64 and from perturbed starts; the champion is the fittest who keeps its
+    fitness there, and whoever does not comes after all who do.
     """
 
     directory: Folder
     """Folder of the run."""
     best: Annotated[int, arg(metavar="N")] = 9
     """How many robots the zoo has, 1 to 100."""
+    film: Literal["mp4", "webp"] | None = None
+    """Also film the champion and the zoo, each robot in a tile of its own; mp4 needs the extra
+    "video"."""
 
     def __call__(self, console: Console) -> int:
         """Look twice at the best, and write them."""
+        from rich.progress import Progress
+
         import warp_springs as ws
         from evolve.export import export
         from evolve.report import verdict
@@ -64,7 +69,12 @@ class Export:
             raise RunError(f"--best must be 1 to 100, not {self.best}")
         run = RunFolder.open(self.directory)
         ws.quiet()
-        finalists, paths = export(run, self.best)
+        shown = self.film is not None and console.is_terminal
+        with Progress(console=console, transient=True, disable=not shown) as bar:
+            task = bar.add_task("filming", total=1.0)
+            finalists, paths = export(
+                run, self.best, self.film, lambda done: bar.update(task, completed=done)
+            )
         print(verdict(finalists, run.config))
         print_written(paths)
         return 0

@@ -10,7 +10,10 @@ import subprocess
 import time
 
 import pytest
+from PIL import Image
+from rich.console import Console
 
+from evolve.run import Run
 from evolve.toml import preset_names
 from tests.evolve.conftest import TINY, command, environment, flags, shell_in
 
@@ -123,6 +126,22 @@ def test_an_export_shows_the_best_in_one_world(shell, run_folder):
         share = custom[0][f"fitness{name}"] / custom[0]["fitness"]
         assert custom[0][f"kept{name}"] == pytest.approx(share) and share >= 0.8
     assert all(data["seed"] == 5 and data["run"] == "cube" for data in custom)
+
+
+def test_an_export_films_champion_and_zoo(run_folder, monkeypatch, capsys):
+    import functools
+
+    import warp_springs as ws
+    from evolve.commands.results import Export
+
+    monkeypatch.setattr(ws, "render", functools.partial(ws.render, size=(96, 54)), raising=False)
+    assert Export(run_folder, best=2, film="webp")(Console()) == 0
+    written = [line.rpartition("/")[2] for line in capsys.readouterr().out.splitlines()]
+    assert written[-3:] == ["zoo.png", "champion.webp", "zoo.webp"]
+    period = Run.open(run_folder).config.encoding.period
+    for name in ("champion", "zoo"):
+        with Image.open(run_folder / f"{name}.webp") as film:
+            assert film.n_frames >= 3 * period * 30 and film.size == (96, 54)
 
 
 def test_a_run_in_which_nobody_survives_says_so(shell, run_folder):

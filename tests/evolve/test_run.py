@@ -150,7 +150,8 @@ def test_what_a_killed_drawing_left_is_removed(tmp_path, tiny):
     run = Run.create(tiny, tmp_path / "run")
 
     def leave() -> None:
-        (run.directory / ".zoo-0123abcd.part").write_bytes(b"half a picture")
+        (run.directory / ".draft-0123abcd").mkdir()
+        (run.directory / ".draft-0123abcd/zoo.png").write_bytes(b"half a picture")
         (run.directory / ".usd-x1y2").mkdir()
         (run.directory / ".usd-x1y2/robots.usdc").write_bytes(b"half an animation")
         (run.directory / ".mine").write_text("not ours")
@@ -214,7 +215,7 @@ def test_sigkill_at_a_random_moment_changes_nothing(undisturbed, moment, tmp_pat
     names = {path.name for path in folder.iterdir()}
     expected = {"champion.usdc", "zoo.usdc", "zoo.png", "learning_curve.png", "dot_plot.png"}
     assert expected <= names
-    assert not [name for name in names if name.endswith(".part") or name.startswith(".usd-")]
+    assert not [name for name in names if name.startswith((".draft-", ".usd-"))]
     with Store.open(folder / "run.sqlite") as store:
         assert len(store.finalists()) == 32
 
