@@ -219,6 +219,8 @@ class Robot(Verbs):
             if name not in FIELDS:
                 raise TypeError(f"a robot has no field {name!r}; it has {', '.join(FIELDS)}")
         kept = {name: getattr(self, name) for name in FIELDS}
+        if "springs" in fields and not self.materials:
+            kept["material"] = None  # nothing is lost, and any number of springs may come
         # Kept arrays are known to be good unless the counts or the springs under them change.
         same_body = "springs" not in fields and (
             "positions" not in fields or np.shape(fields["positions"]) == self.positions.shape
