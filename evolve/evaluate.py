@@ -127,11 +127,15 @@ class Evaluator:
         return SecondLook(dt, halved, kept[0], usual, kept[1], survives)
 
     def film(
-        self, robots: Sequence[ws.Robot], fps: float = 30.0, least_cycles: float = 0.0
+        self,
+        robots: Sequence[ws.Robot],
+        fps: float = 30.0,
+        least_cycles: float = 0.0,
+        energy: bool = False,
     ) -> ws.Result:
         """Simulate a whole trial, or more cycles if asked, and record all frames of all robots."""
         duration = max(self.settle + self.measure, least_cycles * self.period)
-        return self._simulate(robots).run(duration, fps=fps)
+        return self._simulate(robots).run(duration, fps=fps, energy=energy)
 
     def _fitness(self, trial: Trial) -> np.ndarray:
         """Fitness of every robot, shape (N,); NaN for those who were stopped."""

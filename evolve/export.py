@@ -53,17 +53,24 @@ def export(
     with run.exporting(), Store.open(run.record_path, write=True) as store:
         finalists = crown(run, store, best)
         zoo = finalists[:best]
-        motion = trial(run, store, zoo)
+        motion = trial(run, store, [member.id for member in zoo])
         paths = _show(run, motion, zoo)
         if film is not None:
             paths += _film(run, motion, zoo, film, progress or (lambda _: None))
         return finalists, paths
 
 
-def trial(run: Run, store: Store, zoo: Sequence[Finalist]) -> ws.Result:
-    """Simulate the whole trial of some finalists again, three cycles at least, with all frames."""
-    robots = _robots(run, store, [member.id for member in zoo])
-    return Evaluator(run.config).film(robots, least_cycles=FILM_CYCLES)
+def trial(run: Run, store: Store, ids: Sequence[int], energy: bool = False) -> ws.Result:
+    """Simulate the whole trial of some individuals again, three cycles at least, with all frames.
+
+    Args:
+        run: Their run.
+        store: Its record.
+        ids: Who they are.
+        energy: Whether to record their energies too.
+    """
+    robots = _robots(run, store, ids)
+    return Evaluator(run.config).film(robots, least_cycles=FILM_CYCLES, energy=energy)
 
 
 def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:

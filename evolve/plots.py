@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evolve.comparison import best_so_far
 from evolve.fitness import UNITS
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     from evolve.store import Record
 
-__all__ = ["dot_plot", "figure", "learning_curve"]
+__all__ = ["dot_plot", "figure", "learning_curve", "performance"]
 
 INK, GREY, BLUE, RED = "#1f2328", "#8a8d91", "#3a6ea5", "#c8452d"
 
@@ -40,7 +41,7 @@ def learning_curve(ax: Axes, record: Record, fitness: str = "speed") -> Axes:
     ends, quantiles = _quantiles(record)
     ax.fill_between(ends, quantiles[0], quantiles[4], color=BLUE, alpha=0.13, linewidth=0)
     ax.fill_between(ends, quantiles[1], quantiles[3], color=BLUE, alpha=0.22, linewidth=0)
-    best = _best_so_far(record.fitness)
+    best = best_so_far(record.fitness)
     ax.plot(record.ids, best, color=RED, linewidth=2.2, label="best so far", zorder=3)
     ax.plot(ends, quantiles[2], color=BLUE, linewidth=1.6, label="median of a generation")
     # The bands overlap: the legend shows the colours that they have together.
@@ -72,7 +73,7 @@ def dot_plot(ax: Axes, record: Record, fitness: str = "speed") -> Axes:
         rasterized=True,
         label="individuals",
     )
-    best = _best_so_far(record.fitness)
+    best = best_so_far(record.fitness)
     ax.plot(record.ids, best, color=RED, linewidth=1.6, label="best so far", zorder=3)
     _mark_last(ax, record, best)
     if not fit.all():
@@ -90,6 +91,37 @@ def dot_plot(ax: Axes, record: Record, fitness: str = "speed") -> Axes:
     return ax
 
 
+def performance(
+    ax: Axes,
+    record: Record,
+    costs: tuple[np.ndarray, np.ndarray, np.ndarray],
+    fitness: str = "speed",
+) -> Axes:
+    """Draw the best so far against spring evaluations, and above it the seconds that they took.
+
+    Args:
+        ax: Axes to draw into.
+        record: Evaluations of a run.
+        costs: What `Store.costs` returned: evaluations, spring evaluations and seconds so far.
+        fitness: Name of the fitness, for the label of the axis.
+    """
+    evaluations, springs, seconds = costs
+    best = best_so_far(record.fitness)[evaluations.astype(int) - 1]
+    ax.plot(springs / 1e9, best, color=RED, linewidth=2.0)
+    _dress(ax, fitness, right=float(springs[-1]) / 1e9)
+    ax.set_xlabel("spring evaluations [10⁹]")
+    ax.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+    above = ax.secondary_xaxis(
+        "top",
+        functions=(
+            lambda x: np.interp(x, np.append(0.0, springs / 1e9), np.append(0.0, seconds)),
+            lambda t: np.interp(t, np.append(0.0, seconds), np.append(0.0, springs / 1e9)),
+        ),
+    )
+    above.set_xlabel("time [s]")
+    return ax
+
+
 def _quantiles(record: Record) -> tuple[np.ndarray, np.ndarray]:
     """Evaluations at the end of each of G generations, and 5 quantiles of its fitness, (5, G)."""
     starts = np.flatnonzero(np.diff(record.generations, prepend=-1))
@@ -102,12 +134,6 @@ def _quantiles(record: Record) -> tuple[np.ndarray, np.ndarray]:
         if len(fitness):
             table[:, g] = np.quantile(fitness, levels)
     return ends, table
-
-
-def _best_so_far(fitness: np.ndarray) -> np.ndarray:
-    """Running maximum, NaN until somebody has a fitness."""
-    best = np.maximum.accumulate(np.where(np.isfinite(fitness), fitness, -np.inf))
-    return np.where(np.isfinite(best), best, np.nan)
 
 
 def _mark_last(ax: Axes, record: Record, best: np.ndarray) -> None:

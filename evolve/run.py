@@ -30,7 +30,15 @@ from evolve.search import Generation, Search, judge_together
 from evolve.store import Store, Timing
 from evolve.toml import dump, load, parse, validate
 
-__all__ = ["Progress", "Run", "Session", "create_seeds", "evolve_together", "open_all"]
+__all__ = [
+    "Progress",
+    "Run",
+    "Session",
+    "create_seeds",
+    "decisive",
+    "evolve_together",
+    "open_all",
+]
 
 RECORD = "run.sqlite"
 LEFTOVERS = (".draft-*", ".usd-*")
@@ -193,8 +201,8 @@ class Run:
 
     def _check_unchanged(self, store: Store) -> None:
         """Refuse to continue a record under another configuration."""
-        then = _decisive(parse(store.meta["config"], str(self.record_path)))
-        now = _decisive(self.config)
+        then = decisive(parse(store.meta["config"], str(self.record_path)))
+        now = decisive(self.config)
         changes = [
             f"{key} was {then.get(key)!r}, is {now.get(key)!r}"
             for key in sorted(then.keys() | now.keys())
@@ -371,7 +379,7 @@ def _refuse_occupied(directory: Path) -> None:
         raise RunError(f"{directory} is not empty ({others[0]}); choose another place with --out")
 
 
-def _decisive(config: RunConfig) -> dict[str, Any]:
+def decisive(config: RunConfig) -> dict[str, Any]:
     """What decides the bits of a record: dotted key -> value."""
     left_out = {
         "name": True,

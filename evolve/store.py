@@ -298,6 +298,20 @@ class Store:
         ids, generations, status = (table[:, i].astype(np.int64) for i in (0, 1, 3))
         return Record(ids, generations, table[:, 2], status)
 
+    def table(self) -> tuple[list[str], Iterator[tuple]]:
+        """Every evaluation with its parents and descriptors: the names of the columns, the rows."""
+        cursor = self._connection.execute(
+            "SELECT id, generation, fitness, status, spring_evaluations, first.parent AS parent_1, "
+            "second.parent AS parent_2, descriptor.* FROM individual "
+            "LEFT JOIN parent AS first ON first.child = id AND first.place = 0 "
+            "LEFT JOIN parent AS second ON second.child = id AND second.place = 1 "
+            "JOIN descriptor ON descriptor.individual = id ORDER BY id"
+        )
+        names = [column[0] for column in cursor.description]
+        twice = names.index("individual")
+        rows = (row[:twice] + row[twice + 1 :] for row in cursor)
+        return names[:twice] + names[twice + 1 :], rows
+
     def best(self, count: int) -> list[int]:
         """Ids of the best individuals, the best first; equal genomes count once."""
         ranking = self._connection.execute(
@@ -324,6 +338,15 @@ class Store:
             Finalist(*row[:4], *(np.nan if x is None else x for x in row[4:8]), bool(row[8]))
             for row in rows
         ]
+
+    def costs(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """After each generation: evaluations, spring evaluations and seconds so far, shape (G,)."""
+        rows = self._connection.execute(
+            "SELECT evaluations, spring_evaluations, evaluation_time + driver_time "
+            "FROM generation ORDER BY number"
+        ).fetchall()
+        evaluations, springs, seconds = np.array(rows, np.float64).reshape(-1, 3).T
+        return evaluations, np.cumsum(springs), np.cumsum(seconds)
 
     def totals(self) -> tuple[int, float, float]:
         """Spring evaluations, seconds of evaluation and seconds of the driver, of the whole run."""

@@ -19,6 +19,7 @@ class Role(IntEnum):
     MUTATION = 3
     SECOND_LOOK = 4
     TRIAL = 5
+    DIVERSITY = 100  # of reports: decides nothing of a run
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def test_a_run_is_never_overwritten(shell, run_folder):
 
 def test_a_report_draws_and_tells(shell, run_folder):
     (run_folder / "dot_plot.png").unlink()
-    report = shell("report", "runs/cube")
+    report = shell("report", "runs/cube", "--plots-only")
     assert report.returncode == 0, report.stderr
     for subject in ("body", "search", "evaluations", "verdict", "second look", "digest"):
         assert f"\n{subject}" in f"\n{report.stdout}"
@@ -152,7 +152,7 @@ def test_a_run_in_which_nobody_survives_says_so(shell, run_folder):
     assert export.stdout.startswith("no champion: none of the 32 best survives the second look; ")
     assert "champion.usdc" not in export.stdout and not (run_folder / "champion.usdc").exists()
     assert (run_folder / "zoo.usdc").exists()
-    assert "0 of 32 survive" in words(shell("report", "runs/cube").stdout)
+    assert "0 of 32 survive" in words(shell("report", "runs/cube", "--plots-only").stdout)
 
 
 MISTAKES = [

@@ -107,10 +107,25 @@ def test_keys_step_turn_and_colour(page):
         before = after
     assert page.evaluate("document.getElementById('color').value") == "material"
     assert not page.evaluate("document.getElementById('skin').checked")
-    assert page.evaluate("document.getElementById('follow').checked"), "a chosen robot is followed"
     page.key("a")
-    assert not page.evaluate("document.getElementById('follow').checked")
+    assert changed(before, settled(page)) > 0.1, "all are seen again"
     assert page.complaints == []
+
+
+def test_the_camera_goes_along_unless_told_not_to(browser, cube, tmp_path):
+    gone = cube.moving((3.0, 0.0, 0.0))
+    result = ws.Simulation([gone], ws.Scene(ground=None, gravity=(0, 0, 0))).run(1.0, fps=10)
+    page = browser.open(ws.export_html(result, tmp_path / "page.html").as_uri(), size=(800, 500))
+    page.wait("document.body.dataset.state === 'ready'")
+    black = [still(page)[:420, :500].max(axis=2) < 50]
+    page.key("End")
+    black.append(settled(page)[:420, :500].max(axis=2) < 50)
+    page.key("Home")
+    page.key("f")
+    page.key("End")
+    black.append(settled(page)[:420, :500].max(axis=2) < 50)
+    assert black[0].sum() > 200 and np.mean(black[0] != black[1]) < 0.002, "it stays in the middle"
+    assert black[2].sum() < 20, "it has left"
 
 
 def test_the_mouse_turns_and_chooses(page):

@@ -131,7 +131,9 @@ class Document:
     def video(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "mp4") -> str:
         """A video of a kind that browsers play: mp4, webm."""
         source = f"data:video/{kind};base64,{_base64(data)}"
-        return _figure(f'<video src="{source}" controls loop muted playsinline></video>', caption)
+        return _figure(
+            f'<video src="{source}" controls autoplay loop muted playsinline></video>', caption
+        )
 
     def page(self, text: str, caption: str = "", printed: str = "") -> str:
         """A whole page, for example one of `ws.html_page`, in a frame that can do no harm.
@@ -183,7 +185,8 @@ def _svg(figure: Figure, salt: str) -> str:
     # The salt keeps the names of clip paths and markers apart from those of other figures.
     settings = {"svg.fonttype": "none", "svg.hashsalt": salt}
     with matplotlib.rc_context(settings), io.StringIO() as target:
-        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+        nothing = {"Date": None, "Creator": None}
+        figure.savefig(target, format="svg", bbox_inches="tight", metadata=nothing)
         text = target.getvalue()
     drawing = text[text.index("<svg") :]
     drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.S)

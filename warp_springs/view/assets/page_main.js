@@ -104,22 +104,42 @@ class Show {
     this.reset();
   }
 
-  // See everyone, or the chosen robot and go with it.
+  // What is gone along with: the chosen robot, or the middle of all.
+  followedAt(moment) {
+    if (!this.everyone) return this.middleAt(moment, this.chosen);
+    const middles = this.scene.robots.map((_, i) => this.middleAt(moment, i));
+    return scaled(middles.reduce(add), 1 / middles.length);
+  }
+
+  // The box that holds everyone in every frame, seen from the middle of all.
+  groupBox() {
+    const boxes = this.scene.times.map((_, frame) => {
+      const moment = { a: frame, b: frame, blend: 0 };
+      const [x, y] = this.followedAt(moment);
+      const box = boxAround(this.scene.robots.map((_, i) => this.boxAt(moment, i)));
+      return { low: sub(box.low, [x, y, 0]), high: sub(box.high, [x, y, 0]) };
+    });
+    const [x, y] = this.followedAt(this.moment);
+    const { low, high } = boxAround(boxes);
+    return { low: add(low, [x, y, 0]), high: add(high, [x, y, 0]) };
+  }
+
+  // See everyone, or the chosen robot, and go along.
   reset() {
     const { scene } = this;
     const canvas = $("view");
     Object.assign(this.camera, { azimuth: -1.05, elevation: 0.42 });
-    $("follow").checked = !this.everyone;
+    $("follow").checked = true;
     const { moment } = this;
-    const ways = scene.robots.map((robot) => robot.reach);
-    const box = this.everyone ? boxAround(ways) : this.boxAt(moment, this.chosen);
+    const box = this.everyone ? this.groupBox() : this.boxAt(moment, this.chosen);
     if (!this.everyone) {  // it is followed along the floor, not up and down
-      box.low[2] = ways[this.chosen].low[2];
-      box.high[2] = ways[this.chosen].high[2];
+      const { reach } = scene.robots[this.chosen];
+      box.low[2] = reach.low[2];
+      box.high[2] = reach.high[2];
     }
     this.camera.frame(box, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
     if (!this.everyone) this.camera.distance *= 1.35;
-    this.followed = this.middleAt(moment, this.chosen);
+    this.followed = this.followedAt(moment);
     this.wake();
   }
 
@@ -155,7 +175,7 @@ class Show {
     $("time").oninput = () => this.seek($("time").value / (this.duration || 1));
     $("color").onchange = () => { this.legend(); this.wake(); };
     $("skin").onchange = () => this.wake();
-    $("follow").onchange = () => { this.followed = this.middleAt(this.moment, this.chosen); this.wake(); };
+    $("follow").onchange = () => { this.followed = this.followedAt(this.moment); this.wake(); };
     $("robot").onchange = () => this.choose(Number($("robot").value));
     $("all").onclick = () => this.all();
     $("reset").onclick = () => this.reset();
@@ -243,7 +263,7 @@ class Show {
   draw() {
     const { moment } = this;
     if ($("follow").checked) {
-      const now = this.middleAt(moment, this.chosen);
+      const now = this.followedAt(moment);
       const shift = sub(now, this.followed);
       shift[2] = 0;
       this.camera.target = add(this.camera.target, shift);
