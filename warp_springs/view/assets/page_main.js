@@ -67,6 +67,7 @@ class Show {
   seek(share) {
     this.play(false);
     this.time = share * this.duration;
+    this.goAlong();
     this.wake();
   }
 
@@ -76,6 +77,7 @@ class Show {
     const { a, blend } = this.moment;
     const here = count < 0 && blend > 1e-3 ? a + 1 : a;
     this.time = times[clamp(here + count, 0, this.frames - 1)] - times[0];
+    this.goAlong();
     this.wake();
   }
 
@@ -109,6 +111,15 @@ class Show {
     if (!this.everyone) return this.middleAt(moment, this.chosen);
     const middles = this.scene.robots.map((_, i) => this.middleAt(moment, i));
     return scaled(middles.reduce(add), 1 / middles.length);
+  }
+
+  // Move the camera as far over the floor as what it follows has moved.
+  goAlong() {
+    if (!$("follow").checked) return;
+    const now = this.followedAt(this.moment);
+    const [x, y] = sub(now, this.followed);
+    this.camera.target = add(this.camera.target, [x, y, 0]);
+    this.followed = now;
   }
 
   // The box that holds everyone in every frame, seen from the middle of all.
@@ -262,13 +273,7 @@ class Show {
 
   draw() {
     const { moment } = this;
-    if ($("follow").checked) {
-      const now = this.followedAt(moment);
-      const shift = sub(now, this.followed);
-      shift[2] = 0;
-      this.camera.target = add(this.camera.target, shift);
-      this.followed = now;
-    }
+    this.goAlong();
     const look = { color: $("color").value, skin: $("skin").checked };
     this.painter.draw(this.camera, moment, look, this.shownBox(moment), this.arrows(moment));
     $("time").value = this.time;
