@@ -10,8 +10,9 @@ from typing import Annotated, Union
 import tyro
 from tyro.conf import subcommand
 
+from evolve.commands.export import Export
 from evolve.commands.presets import Presets
-from evolve.commands.results import Digest, Export, Report
+from evolve.commands.results import Digest, Report
 from evolve.commands.run import Resume, Run
 from evolve.commands.shared import INTERRUPTED
 from evolve.errors import RunError

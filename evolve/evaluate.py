@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -132,10 +132,11 @@ class Evaluator:
         fps: float = 30.0,
         least_cycles: float = 0.0,
         energy: bool = False,
+        progress: Callable[[float], None] | None = None,
     ) -> ws.Result:
         """Simulate a whole trial, or more cycles if asked, and record all frames of all robots."""
         duration = max(self.settle + self.measure, least_cycles * self.period)
-        return self._simulate(robots).run(duration, fps=fps, energy=energy)
+        return self._simulate(robots).run(duration, fps=fps, energy=energy, progress=progress)
 
     def _fitness(self, trial: Trial) -> np.ndarray:
         """Fitness of every robot, shape (N,); NaN for those who were stopped."""

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from evolve.errors import RunError
 from evolve.evaluate import Evaluator
 from evolve.run import Run
+from evolve.show import FILM_CYCLES, Show, Style, Watch, express, label
 from evolve.store import Finalist, Store
 
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ZOO_SIZE", "crown", "export", "label", "trial"]
+__all__ = [
+    "FILM_CYCLES",
+    "ZOO_SIZE",
+    "crown",
+    "export",
+    "export_generation",
+    "export_robots",
+    "label",
+    "trial",
+]
 
-FILM_CYCLES = 3
-"""Cycles of the muscles that an animation shows at least."""
 ZOO_SIZE = 9
 """Robots in the zoo, unless told otherwise."""
 
@@ -27,7 +36,8 @@ def export(
     run: Run,
     best: int = ZOO_SIZE,
     film: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    style: Style | None = None,
+    watch: Watch | None = None,
 ) -> tuple[list[Finalist], list[Path]]:
     """Crown the champion of a run; show it, and the zoo of the best.
 
@@ -39,7 +49,8 @@ def export(
         run: A run in which somebody has a fitness.
         best: How many different individuals are shown in the zoo.
         film: "mp4" or "webp": write champion and zoo as films too.
-        progress: Called with the share of the films that is drawn, 0 ... 1.
+        style: How animations are written.
+        watch: Told what is being done, if anybody wants to know.
 
     Returns:
         Everybody who was looked at twice, the champion first if there is one, and the paths of
@@ -52,12 +63,57 @@ def export(
     """
     with run.exporting(), Store.open(run.record_path, write=True) as store:
         finalists = crown(run, store, best)
-        zoo = finalists[:best]
-        motion = trial(run, store, [member.id for member in zoo])
-        paths = _show(run, motion, zoo)
-        if film is not None:
-            paths += _film(run, motion, zoo, film, progress or (lambda _: None))
-        return finalists, paths
+        return finalists, _zoo(Show(run, store, style, watch), finalists[:best], film)
+
+
+def export_generation(
+    run: Run, generation: int, style: Style | None = None, watch: Watch | None = None
+) -> tuple[int, Path]:
+    """Write everybody of a generation as generation_NNNN.usdc, the fittest first.
+
+    Args:
+        run: The run.
+        generation: Which generation, negative from the last.
+        style: How the animation is written.
+        watch: Told what is being done, if anybody wants to know.
+
+    Returns:
+        How many robots there are, and the path.
+
+    Raises:
+        RunError: There is no such generation.
+        StoreError: Another process exports this run.
+    """
+    with run.exporting(), Store.open(run.record_path) as store:
+        record, count = store.record(), store.generations
+        if not -count <= generation < count:
+            raise RunError(f"{run.directory} has generations 0 to {count - 1}, not {generation}")
+        generation %= count
+        own = record.generations == generation
+        worth = np.where(np.isnan(record.fitness[own]), -np.inf, record.fitness[own])
+        ids = record.ids[own][np.argsort(-worth, kind="stable")].tolist()
+        show = Show(run, store, style, watch)
+        return len(ids), show.write(f"generation_{generation:04d}", ids, show.simulate(ids))
+
+
+def export_robots(
+    run: Run, ids: Sequence[int], style: Style | None = None, watch: Watch | None = None
+) -> Path:
+    """Write some individuals of a run as robots.usdc, in their order.
+
+    Raises:
+        RunError: Somebody is not in the record, or named twice.
+        StoreError: Another process exports this run.
+    """
+    with run.exporting(), Store.open(run.record_path) as store:
+        known = set(store.record().ids.tolist())
+        for individual in ids:
+            if individual not in known:
+                raise RunError(f"{run.directory} has no individual {individual}")
+        if len(set(ids)) < len(ids):
+            raise RunError("an individual is named twice")
+        show = Show(run, store, style, watch)
+        return show.write("robots", ids, show.simulate(ids))
 
 
 def trial(run: Run, store: Store, ids: Sequence[int], energy: bool = False) -> ws.Result:
@@ -69,8 +125,7 @@ def trial(run: Run, store: Store, ids: Sequence[int], energy: bool = False) -> w
         ids: Who they are.
         energy: Whether to record their energies too.
     """
-    robots = _robots(run, store, ids)
-    return Evaluator(run.config).film(robots, least_cycles=FILM_CYCLES, energy=energy)
+    return Show(run, store).simulate(ids, energy)
 
 
 def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
@@ -85,87 +140,26 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     ids = store.best(max(best, run.config.task.second_look.candidates))
     if not ids:
         raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to export")
-    look = Evaluator(run.config).second_look(_robots(run, store, ids), store.scores(ids).fitness)
+    look = Evaluator(run.config).second_look(express(run, store, ids), store.scores(ids).fitness)
     store.put_second_look(ids, look)
     return store.finalists()
 
 
-def _show(run: Run, motion: ws.Result, zoo: Sequence[Finalist]) -> list[Path]:
-    """Write the animations and the picture of the zoo; the champion is the first of it."""
+def _zoo(show: Show, zoo: Sequence[Finalist], film: str | None) -> list[Path]:
+    """Write animations, pictures and films of the zoo; the champion is the first of it."""
     import warp_springs as ws
 
-    names = {place: f"robot_{member.id}" for place, member in enumerate(zoo)}
-    notes = {place: _notes(run, member) for place, member in enumerate(zoo)}
-    champion, *others = (run.directory / f for f in ("champion.usdc", "zoo.usdc", "zoo.png"))
-    if zoo[0].survives:
-        ws.export_usd(motion, champion, robots=[0], names={0: names[0]}, custom_data={0: notes[0]})
-    else:
-        champion.unlink(missing_ok=True)
-    ws.export_usd(motion, others[0], names=names, custom_data=notes)
-    ws.render(motion, others[1], layout="panel", labels=[label(member) for member in zoo])
-    return [champion, *others] if zoo[0].survives else others
-
-
-def _film(
-    run: Run,
-    motion: ws.Result,
-    zoo: Sequence[Finalist],
-    suffix: str,
-    progress: Callable[[float], None],
-) -> list[Path]:
-    """Film the champion, if there is one, and the zoo, a tile for each."""
-    import warp_springs as ws
-
-    champion, panel = (run.directory / f"{name}.{suffix}" for name in ("champion", "zoo"))
-    ws.render(
-        motion,
-        panel,
-        layout="panel",
-        labels=[label(member) for member in zoo],
-        progress=lambda done: progress(0.5 * done),
-    )
-    if not zoo[0].survives:
-        champion.unlink(missing_ok=True)
-        return [panel]
-    ws.render(
-        motion,
-        champion,
-        robots=0,
-        caption=label(zoo[0]),
-        progress=lambda done: progress(0.5 + 0.5 * done),
-    )
-    return [champion, panel]
-
-
-def _robots(run: Run, store: Store, ids: Sequence[int]) -> Sequence[ws.Robot]:
-    encoding = run.config.make_encoding()
-    return encoding.express(encoding.from_bytes(store.genomes(ids)))
-
-
-def label(member: Finalist) -> str:
-    """What is written beside a finalist in a picture."""
-    return f"#{member.id}   {member.fitness:.2f}" + ("" if member.survives else "   demoted")
-
-
-def _notes(run: Run, member: Finalist) -> dict[str, Any]:
-    """What a USD file keeps of a robot: name -> value."""
-    config = run.config
-    # USD holds no NaN; None is left out.
-    again = {
-        "fitnessAtHalfStep": member.halved,
-        "keptAtHalfStep": member.halved_kept,
-        "fitnessPerturbed": member.perturbed,
-        "keptPerturbed": member.perturbed_kept,
-    }
-    return {
-        "run": config.name,
-        "seed": config.seed,
-        "encoding": config.encoding.type,
-        "optimizer": config.optimizer.type,
-        "individual": member.id,
-        "generation": member.generation,
-        "fitnessName": config.task.fitness,
-        "fitness": member.fitness,
-        "survivesSecondLook": member.survives,
-        **{name: None if math.isnan(value) else value for name, value in again.items()},
-    }
+    ids, labels = [member.id for member in zoo], [label(member) for member in zoo]
+    motion, survives = show.simulate(ids), zoo[0].survives
+    paths = [show.write("champion", ids, motion, only=0)] if survives else []
+    paths.append(show.write("zoo", ids, motion))
+    picture = show.directory / "zoo.png"
+    paths.append(ws.render(motion, picture, layout="panel", labels=labels))
+    if film is not None:
+        if survives:
+            paths.append(show.film("champion", motion, film, robots=0, caption=labels[0]))
+        paths.append(show.film("zoo", motion, film, layout="panel", labels=labels))
+    if not survives:  # what an earlier export may have left
+        for stale in (show.path("champion"), show.directory / f"champion.{film}"):
+            stale.unlink(missing_ok=True)
+    return paths

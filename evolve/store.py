@@ -279,6 +279,11 @@ class Store:
         rows = [self._one(query, i) + self._one(described, i)[1:] for i in ids]
         return _scores(rows, names)
 
+    def parents_of(self, individual: int) -> list[int]:
+        """The ids of an individual's parents, the first parent first; none of the first ones."""
+        query = "SELECT parent FROM parent WHERE child = ? ORDER BY place"
+        return [row[0] for row in self._connection.execute(query, (int(individual),))]
+
     def judged(self, at_once: int = 1024) -> Iterator[tuple[list[bytes], Scores]]:
         """All genomes with their scores, some at a time, in the order of the ids."""
         columns = "genome, fitness, status, spring_evaluations, descriptor.*"

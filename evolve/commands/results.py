@@ -1,10 +1,10 @@
-"""``evolve report``, ``evolve export`` and ``evolve digest``: what came of a run."""
+"""``evolve report`` and ``evolve digest``: what came of a run."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
@@ -14,7 +14,7 @@ from evolve.errors import RunError
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["Digest", "Export", "Report"]
+__all__ = ["Digest", "Report"]
 
 
 @dataclass(frozen=True)
@@ -60,48 +60,6 @@ class Report:
             with console.status("writing the report") as status:
                 paths += write_report(runs, out, notes, status.update)
         console.print(table(runs[0]), highlight=False)
-        print_written(paths)
-        return 0
-
-
-@dataclass(frozen=True)
-class Export:
-    """Simulate the best robots of a run again and write them as animations.
-
-    Writes champion.usdc, zoo.usdc with the best different individuals side by side, and zoo.png to
-    the folder of the run, and films of both if asked. The best are first simulated again, at half
-    the time step in float64 and from perturbed starts; the champion is the fittest who keeps its
-    fitness there, and whoever does not comes after all who do.
-    """
-
-    directory: Folder
-    """Folder of the run."""
-    best: Annotated[int, arg(metavar="N")] = 9
-    """How many robots the zoo has, 1 to 100."""
-    film: Literal["mp4", "webp"] | None = None
-    """Also film the champion and the zoo, each robot in a tile of its own; mp4 needs the extra
-    "video"."""
-
-    def __call__(self, console: Console) -> int:
-        """Look twice at the best, and write them."""
-        from rich.progress import Progress
-
-        import warp_springs as ws
-        from evolve.export import export
-        from evolve.report import verdict
-        from evolve.run import Run as RunFolder
-
-        if not 1 <= self.best <= 100:
-            raise RunError(f"--best must be 1 to 100, not {self.best}")
-        run = RunFolder.open(self.directory)
-        ws.quiet()
-        shown = self.film is not None and console.is_terminal
-        with Progress(console=console, transient=True, disable=not shown) as bar:
-            task = bar.add_task("filming", total=1.0)
-            finalists, paths = export(
-                run, self.best, self.film, lambda done: bar.update(task, completed=done)
-            )
-        print(verdict(finalists, run.config))
         print_written(paths)
         return 0
 

@@ -132,7 +132,7 @@ def test_an_export_films_champion_and_zoo(run_folder, monkeypatch, capsys):
     import functools
 
     import warp_springs as ws
-    from evolve.commands.results import Export
+    from evolve.commands.export import Export
 
     monkeypatch.setattr(ws, "render", functools.partial(ws.render, size=(96, 54)), raising=False)
     assert Export(run_folder, best=2, film="webp")(Console()) == 0
@@ -142,6 +142,38 @@ def test_an_export_films_champion_and_zoo(run_folder, monkeypatch, capsys):
     for name in ("champion", "zoo"):
         with Image.open(run_folder / f"{name}.webp") as film:
             assert film.n_frames >= 3 * period * 30 and film.size == (96, 54)
+
+
+def custom_data(path):
+    """What the robots of a file say of themselves, by their names."""
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(path))
+    robots = stage.GetPrimAtPath("/World/Robots").GetChildren()
+    return {robot.GetName(): robot.GetCustomData() for robot in robots}
+
+
+def test_an_export_shows_a_whole_generation(shell, run_folder):
+    export = shell("export", "runs/cube", "--generation", -1, "--format", "usda")
+    assert export.returncode == 0, export.stderr
+    path = run_folder / "generation_0003.usda"
+    assert export.stdout == f"24 robots\nwrote\n  runs/cube/{path.name}\n"
+    told = custom_data(path)
+    assert len(told) == 24
+    assert all(data["generation"] == 3 for data in told.values())
+    assert all(name == f"robot_{data['individual']}" for name, data in told.items())
+    assert all(1 <= len(data["parents"]) <= 2 for data in told.values())
+    fitness = [data["fitness"] for data in told.values() if "fitness" in data]
+    assert len(fitness) > 12 and fitness == sorted(fitness, reverse=True)
+
+
+def test_an_export_shows_chosen_robots(shell, run_folder):
+    export = shell("export", "runs/cube", "--robots", 7, 3, "--color", "material")
+    assert export.returncode == 0, export.stderr
+    told = custom_data(run_folder / "robots.usdc")
+    assert list(told) == ["robot_7", "robot_3"]
+    assert all("parents" not in data for data in told.values())  # they were the first
+    assert not (run_folder / "robots.usdc").read_bytes().startswith(b"#usda")
 
 
 def test_a_run_in_which_nobody_survives_says_so(shell, run_folder):
@@ -174,6 +206,7 @@ MISTAKES = [
     (["export", "nowhere"], "there is no folder nowhere"),
     (["digest", "nowhere"], "there is no folder nowhere"),
     (["export", ".", "--best", 0], "--best must be 1 to 100, not 0"),
+    (["export", ".", "--generation", 0, "--robots", 1], "--robots and --generation are two"),
     (["digest", "."], ". holds no run (it has no run.toml)"),
 ]
 

@@ -37,13 +37,15 @@ def facts(result: Result, item: Track, scale: float) -> dict[str, Any]:
     """What the file itself says of a robot; the scale [N] is that of its stress colours."""
     from warp_springs.stability import Status
 
-    status = Status(int(result.status[item.index]))
+    robot, status = result.robots[item.index], Status(int(result.status[item.index]))
     found = {
         "index": item.index,
         "status": status.name,
         "stressScale": scale,
-        "masses": result.robots[item.index].n_masses,
-        "springs": result.robots[item.index].n_springs,
+        "masses": robot.n_masses,
+        "springs": robot.n_springs,
+        "mass": robot.mass,
+        "omega": robot.omega,
     }
     if status:
         found["statusTime"] = float(result.status_time[item.index])
