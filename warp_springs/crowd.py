@@ -51,7 +51,7 @@ def crowds(
     alike = np.stack([level, substeps, 0 * level])
     kind = kind_of(group.layout, device)
     if kind is Blocks:
-        alike[2] = [block_size(m) for m in masses.tolist()]
+        alike[2] = [block_size(group.features.precision, m) for m in masses.tolist()]
     elif kind is Threads:
         alike[2] = np.arange(len(level))  # one body after the other, each by all threads
     edges = np.flatnonzero((np.diff(alike, axis=1) != 0).any(axis=0)) + 1
@@ -331,7 +331,7 @@ class Blocks(Crowd):
     layout = "block"
 
     def _make(self) -> None:
-        self._size = block_size(int(self._lists.slots.max()))
+        self._size = block_size(self.features.precision, int(self._lists.slots.max()))
         # Blocks on a CPU share their memory of a block: one launch at a time.
         self.gang = self.device.is_cpu
         self.launch_work = 2e6 if self.device.is_cpu else 1e10

@@ -13,8 +13,9 @@ LAYOUTS = ("auto", "lanes", "block", "flat")
 #: Masses from which on several threads on one body beat one thread on several (measured, see
 #: benchmarks/huge.py).
 LARGE = 1025
-#: Threads of a block, for robots of up to as many masses. More do not exist on a GPU.
-BLOCK_SIZES = (256, 512, 1024)
+#: Threads of a block, for robots of up to as many masses. With more, a thread would not have the
+#: registers it needs (see benchmarks/cuda_static.py).
+BLOCK_SIZES = {"float32": (256, 512), "float64": (256, 384)}
 
 
 def device_named(name: object) -> wp.Device:
@@ -33,7 +34,7 @@ def device_named(name: object) -> wp.Device:
         ) from None
 
 
-def check_layout(layout: str, device: wp.Device, masses: Sequence[int]) -> None:
+def check_layout(layout: str, device: wp.Device, precision: str, masses: Sequence[int]) -> None:
     """Refuse a layout that the device does not have, or a robot that does not fit.
 
     Raises:
@@ -41,24 +42,24 @@ def check_layout(layout: str, device: wp.Device, masses: Sequence[int]) -> None:
     """
     if layout == "lanes" and not device.is_cpu:
         raise ValueError(f"layout: 'lanes' is for a CPU, the device is {device.alias!r}")
-    if layout == "block":
-        for index, count in enumerate(masses):
-            if count > BLOCK_SIZES[-1]:
-                raise ValueError(
-                    f"layout: robots[{index}] has {count} masses, "
-                    f"'block' expects {BLOCK_SIZES[-1]} or fewer"
-                )
+    largest = BLOCK_SIZES[precision][-1]
+    for index, count in enumerate(masses):
+        if layout == "block" and count > largest:
+            raise ValueError(
+                f"layout: robots[{index}] has {count} masses, "
+                f"'block' expects {largest} or fewer in {precision}"
+            )
 
 
-def choose(layout: str, device: wp.Device, masses: int) -> str:
+def choose(layout: str, device: wp.Device, precision: str, masses: int) -> str:
     """The layout of a robot with so many masses."""
     if layout != "auto":
         return layout
     if device.is_cpu:
         return "flat" if masses >= LARGE else "lanes"
-    return "block" if masses <= BLOCK_SIZES[-1] else "flat"
+    return "block" if masses <= BLOCK_SIZES[precision][-1] else "flat"
 
 
-def block_size(masses: int) -> int:
+def block_size(precision: str, masses: int) -> int:
     """Threads of the blocks for robots of so many masses."""
-    return next(size for size in BLOCK_SIZES if masses <= size)
+    return next(size for size in BLOCK_SIZES[precision] if masses <= size)

@@ -51,7 +51,8 @@ class Simulation:
             results agree to rounding. ``"auto"`` chooses for each robot: on a CPU ``"lanes"``
             (many robots at once, one in each SIMD lane), for a large body ``"flat"`` (its masses
             shared by all threads); on a GPU ``"block"`` (whole robots in a block of threads, up to
-            1,024 masses), for a larger body ``"flat"``. A CPU runs ``"block"`` slowly, to verify.
+            512 masses, 384 in float64), for a larger body ``"flat"``. A CPU runs ``"block"`` too,
+            slowly, to verify.
 
     Raises:
         ValueError: An argument is out of range, there is no robot, the machine has no such device,
@@ -93,18 +94,14 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
-        if precision == "mixed":
-            if layout not in ("auto", "lanes") or not place.is_cpu:
-                raise ValueError("precision: 'mixed' is for the layout 'lanes' on a CPU")
-            layout = "lanes"
-        check_layout(layout, place, [robot.n_masses for robot in _bodies(self.robots)])
+        check_layout(layout, place, precision, [robot.n_masses for robot in _bodies(self.robots)])
         self.dt, self.device, self.layout = AUTO_DT if auto else float(dt), place.alias, layout
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
-        layout_of = functools.partial(choose, layout, place)
+        layout_of = functools.partial(choose, layout, place, precision)
         self._batch = Batch(self.robots, self.scene, self._method, layout_of)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)

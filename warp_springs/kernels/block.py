@@ -17,6 +17,8 @@ from warp_springs.kernels.gather import GatherFeatures, gather_structs, passes, 
 
 __all__ = ["BLOCK", "block"]
 
+#: Registers that the threads of a block share.
+REGISTERS = 65536
 #: Columns of the table of blocks.
 BLOCK = ("slice", "slices", "robot", "robots")
 
@@ -126,7 +128,10 @@ def block(features: GatherFeatures, size: int) -> wp.Kernel:
         last_step: wp.int64,
     ): ...
 
-    @wp.kernel(module=module, launch_bounds=size, grid_stride=False)
+    # All registers that so many threads may have: the compiler would rather spill some.
+    registers = min(255, REGISTERS // size // 8 * 8)
+
+    @wp.kernel(module=module, cuda_max_registers=registers, grid_stride=False)
     def advance(
         model: Model,
         state: State,
