@@ -20,10 +20,11 @@ import warp as wp
 from warp_springs.batch import Batch, Group
 from warp_springs.gathering import Bodies, Lists, arrays
 from warp_springs.kernels.block import BLOCK, block
-from warp_springs.kernels.buffers import BUNDLE, SEEN, structs
+from warp_springs.kernels.buffers import BUNDLE, SEEN, real_dtype, structs
 from warp_springs.kernels.bundle import CHECK_EVERY
 from warp_springs.kernels.flat import launches, threads
 from warp_springs.kernels.gather import (
+    CHUNK,
     LOOKS,
     GatherFeatures,
     gather_structs,
@@ -135,16 +136,21 @@ class Crowd:
         if ledger not in self._kernels:
             features = replace(self.features, ledger=ledger)
             kernels, over = look(features)
-            sizes = {
-                "sites": self._slots // (features.width if features.vector else 1),
-                "chunks": len(self._given["model"].chunks) // 3,
-                "robots": self._robots,
-            }
+            sizes = self._sizes(features)
             looks = [self._recorded(k, sizes[name]) for k, name in zip(kernels, over, strict=True)]
             self._kernels[ledger] = self._record(features), looks
         self._advance, self._look = self._kernels[ledger]
         for name in ("ledgers", "good_ledgers"):
             getattr(self._given["state"], name).zero_()
+
+    def _sizes(self, features: GatherFeatures) -> dict[str, int]:
+        """What a kernel may be launched over."""
+        return {
+            "slots": self._slots,
+            "sites": self._slots // (features.width if features.vector else 1),
+            "chunks": len(self._given["model"].chunks) // len(CHUNK),
+            "robots": self._robots,
+        }
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all robots from ``first_step`` to ``last_step`` of the run."""
@@ -192,7 +198,11 @@ class Crowd:
         for label, struct in structs_of:
             filled[label] = struct()
             for name, field in struct.vars.items():
-                values = packed[name].astype(wp.dtype_to_numpy(field.type.dtype)).ravel()
+                values = (
+                    packed.get(name, np.zeros(0))
+                    .astype(wp.dtype_to_numpy(field.type.dtype))
+                    .ravel()
+                )
                 setattr(filled[label], name, self._array(aligned([values], values.dtype)))
         return filled
 
@@ -211,10 +221,10 @@ class Crowd:
         seen = structs(precision).seen()
         for name, here in self._seen_in.items():
             setattr(seen, name, self._array(self.buffers[name][here]))
-        chunks = len(self._given["model"].chunks) // 3
+        chunks = len(self._given["model"].chunks) // len(CHUNK)
         return {
             "seen": seen,
-            "shown": self._array(aligned([np.zeros(4 * self._slots)], np.dtype(precision))),
+            "shown": self._array(aligned([np.zeros(4 * self._slots)], real_dtype(precision))),
             "parts": wp.zeros(LOOKS * self._slots, dtype=wp.float64, device=self.device),
             "sums": wp.zeros(LOOKS * chunks, dtype=wp.float64, device=self.device),
         }
@@ -288,10 +298,10 @@ class Launches(Crowd):
 
     def _record(self, features: GatherFeatures) -> tuple[list, list, wp.Launch]:
         kernels = launches(features)
-        sizes = [self._slots] * 2 + [self._robots]
+        sizes = self._sizes(features)
         return (
             [self._recorded(kernel, self._slots) for kernel in kernels.steps],
-            [self._recorded(k, size) for k, size in zip(kernels.check, sizes, strict=True)],
+            [self._recorded(kernel, sizes[over]) for kernel, over in kernels.check],
             self._recorded(kernels.tick, 1),
         )
 

@@ -199,16 +199,28 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
     chunks, first_chunk, chunk_count = _chunks(lists)
     robots = [
         lists.first,
+        masses,
         table["state"] - table["state"].min(),
         table["lane"] - table["lane"].min(),
         first_chunk,
         chunk_count,
     ]
     positions = bodies.values("positions", "state", 3 * masses).reshape(-1, 3)
-    velocities = bodies.values("velocities", "state", 3 * masses).reshape(-1, 3)
     quads = np.zeros((len(lists.home), 4), positions.dtype)
     quads[lists.slot, :3] = positions
     quads[lists.slot, 3] = bodies.values("inverse_masses", "mass", masses)
+
+    def by_lane(name: str) -> np.ndarray:
+        values = bodies.values(name, "state", 3 * masses).reshape(-1, 3)
+        return _by_lane(values, lists, features)
+
+    mixed = {}
+    if features.precision == "mixed":
+        for name in ("low_positions", "low_velocities"):
+            mixed[name] = mixed[f"good_{name}"] = by_lane(name)
+        mixed["quanta"] = bodies.values("quanta", "lane", one)
+        mixed["origins"] = bodies.buffers["origins"][ranges(3 * table["lane"], 3 * one)]
+        mixed["shifts"] = np.zeros(3 * n)
     waves = bodies.buffers["oscillators"][ranges(4 * table["lane"], 4 * one)].reshape(n, 4)
     return {
         "robots": np.stack(robots, axis=1),
@@ -221,9 +233,9 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         "turns": waves[:, 2:],
         "reaches2": bodies.values("reaches2", "lane", one),
         "positions": np.stack([quads, quads]),
-        "velocities": _by_lane(velocities, lists, features),
-        "good_positions": _by_lane(positions, lists, features),
-        "good_velocities": _by_lane(velocities, lists, features),
+        "velocities": by_lane("velocities"),
+        "good_positions": by_lane("positions"),
+        "good_velocities": by_lane("velocities"),
         "rests": np.zeros(len(lists.home)),
         "ledgers": np.zeros(4 * len(lists.home)),
         "good_ledgers": np.zeros(4 * len(lists.home)),
@@ -231,6 +243,7 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         "states": bodies.values("states", "lane", one),
         "state_times": np.zeros(n),
         "flags": np.zeros(2 * n, np.int32),
+        **mixed,
     }
 
 

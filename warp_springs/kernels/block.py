@@ -43,7 +43,9 @@ auto flip = [&]() { meet(); side = 1 - side; };
 
 real weight;
 const Vec x_start = own_quad(state.positions.data, outside, weight);
-Vec velocity = load(state.velocities.data, outside);
+Vec low = MIXED ? load(state.low_positions.data, outside) : Vec{};
+Sum velocity = load_sum(state.velocities.data, state.low_velocities.data, outside);
+look_up_origin(robot);
 if (inside) { keep_quad(now(), at, x_start, weight); keep_quad(then(), at, x_start, weight); }
 scalar sine = state.oscillators.data[2 * robot], cosine = state.oscillators.data[2 * robot + 1];
 real rest = zero, power = zero;
@@ -52,13 +54,13 @@ meet();
 
 auto move = [&](bool shifted, scalar time, bool start, bool last) {
     if (moving)
-        move_slot(at, now(), then(), velocity, rest, sine, cosine, shifted, time, start, last);
+        move_slot(at, now(), then(), low, velocity, rest, sine, cosine, shifted, time, start, last);
     flip();
 };
 auto kick_and_drift = move;
 auto euler = [&]() { move(false, dt, false, true); };
 auto gradient_shift = [&]() {
-    if (moving) shift_slot(at, now(), then(), sine, cosine);
+    if (moving) shift_slot(at, now(), then(), low, sine, cosine);
     flip();
 };
 auto enter_work = [](scalar) {};
@@ -70,10 +72,10 @@ auto all_stopped = [=]() -> bool {
 };
 auto check = [&](long long n) {
     int* const flag = state.flags.data + robot;
-    if (moving) raise(flag, trouble(at, now(), velocity));
+    if (moving) raise(flag, trouble(at, now(), low, velocity));
     meet();
     const int found = is_mass ? *(volatile int*)flag : 0;
-    if (is_mass) settle(at, !moving || found != 0, now(), then(), velocity);
+    if (is_mass) settle(at, !moving || found != 0, now(), then(), low, velocity);
     if (found != 0) moving = false;
     meet();
     if (leader) {
@@ -82,8 +84,21 @@ auto check = [&](long long n) {
             state.state_times.data[robot] = double(n) * run.exact_dt;
         }
         *flag = 0;
+        double sums[3] = {};
+        if (MIXED && moving) {
+            const int masses = model.robots.data[robot * ROBOT_COLUMNS + 1];
+            add_positions(now() + 4 * at.base, (masses + SLICE - 1) / SLICE * SLICE, sums);
+            lead_origin(robot, sums);
+        }
     }
     meet();
+#if MIXED
+    if (moving) {
+        look_up_origin(robot);
+        follow(at, now(), low);
+    }
+    meet();
+#endif
 };
 auto set_oscillators = [&](long long n) { oscillator(robot, n, sine, cosine); };
 auto turn_oscillators = [&]() { if (ACTUATED) turn(robot, sine, cosine); };
@@ -96,7 +111,8 @@ _BLOCK_END = r"""
 if (inside) {
     const Vec x_end = own_quad(now(), at, weight);
     keep_quad(state.positions.data, outside, x_end, weight);
-    store(state.velocities.data, outside, velocity);
+    if (MIXED) store(state.low_positions.data, outside, low);
+    store_sum(state.velocities.data, state.low_velocities.data, outside, velocity);
 }
 if (leader) {
     state.oscillators.data[2 * robot] = sine;

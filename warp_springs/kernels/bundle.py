@@ -175,8 +175,8 @@ auto all_stopped = [=]() -> bool { return !any(~stopped_lanes()); };
 """
 
 CONTROL = r"""
-// The origin follows a robot whose centre has left it by more than a quantum, in whole quanta. What
-// a shifted position cannot hold goes to its low part.
+#if MIXED
+// The origin follows a robot whose centre has left it by more than a quantum, in whole quanta.
 auto follow = [&]() {
     Vec center = {};
     for (int i = 0; i < M; ++i) center = center + x[i];
@@ -189,22 +189,19 @@ auto follow = [&]() {
     };
     const real shift[3] = {way(center.x), way(center.y), way(center.z)};
     if (!any((shift[0] != zero) | (shift[1] != zero) | (shift[2] != zero))) return;
-    auto less = [](real& a, real& low, real by) {
-        const real sum = a - by, part = sum - a;
-        const real rest = low + ((a - (sum - part)) - (by + part));
-        a = sum + rest;
-        low = rest - (a - sum);
-    };
     for (int i = 0; i < M; ++i) {
-        less(x[i].x, low_x[i].x, shift[0]);
-        less(x[i].y, low_x[i].y, shift[1]);
-        less(x[i].z, low_x[i].z, shift[2]);
+        move_origin(x[i].x, low_x[i].x, shift[0]);
+        move_origin(x[i].y, low_x[i].y, shift[1]);
+        move_origin(x[i].z, low_x[i].z, shift[2]);
         good_x[i] = x[i]; good_low_x[i] = low_x[i];
     }
     for (int c = 0; c < 3; ++c)
         for (int l = 0; l < W; ++l) origins[c * W + l] += double(shift[c][l]);
     look_up_origin();
 };
+#else
+auto follow = []() {};
+#endif
 // Stops the robots that went wrong since the last check where they were last good.
 auto check = [&](long long n) {
     mask stopped = stopped_lanes();
@@ -232,7 +229,7 @@ auto check = [&](long long n) {
         }
     }
     for (int e = 0; LEDGER && e < 4; ++e) restore(ledger[e], good_ledger[e]);
-    if (MIXED) follow();
+    follow();
 };
 auto set_oscillators = [&](long long n) {
     for (int l = 0; l < W; ++l) {

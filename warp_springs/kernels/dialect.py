@@ -106,11 +106,13 @@ def vector_dialect(precision: str, width: int) -> str:
 
 def scalar_dialect(precision: str) -> str:
     """The same names for one number, on a GPU or a CPU."""
-    scalar, _, _, tiny, *_ = _TYPES[precision]
+    name = real_dtype(precision).name
+    scalar, _, _, tiny, *_ = _TYPES[name]
     return f"""
     #undef MIXED
-    #define MIXED 0
+    #define MIXED {int(precision == "mixed")}
     typedef {scalar} scalar;
+    typedef {"float" if wide_dtype(precision).itemsize == 4 else "double"} wide_scalar;
     typedef scalar real;
     typedef bool mask;
     const int W = 1;
@@ -118,13 +120,13 @@ def scalar_dialect(precision: str) -> str:
     const real zero = 0;
     auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
     auto any = [](mask m) -> bool {{ return m; }};
-    auto square_root = [](real a) -> real {{ return {_ROOT[precision]}; }};
+    auto square_root = [](real a) -> real {{ return {_ROOT[name]}; }};
     auto over_root = [](real h, real a) -> real {{
     #if defined(__CUDA_ARCH__)
-        {_DEVICE_ROOT[precision]}
+        {_DEVICE_ROOT[name]}
         return (h + h) * y;
     #else
-        return (h + h) / {_ROOT[precision]};
+        return (h + h) / {_ROOT[name]};
     #endif
     }};
     """

@@ -23,6 +23,20 @@ CPU_OPTIONS = {
     "cpu_compiler_flags": "-march=native -mprefer-vector-width=512",
 }
 
+# Where both keep what a mass is besides its position.
+_KEPT = r"""
+auto low_at = [=](Slot at) -> Vec {
+    return MIXED ? load(state.low_positions.data, at) : Vec{};
+};
+auto velocity_at = [=](Slot at) -> Sum {
+    return load_sum(state.velocities.data, state.low_velocities.data, at);
+};
+auto keep = [=](Slot at, Vec low, const Sum& v) {
+    if (MIXED) store(state.low_positions.data, at, low);
+    store_sum(state.velocities.data, state.low_velocities.data, at, v);
+};
+"""
+
 _THREADS = r"""
 const int robot = 0, division_ = 1;
 const long long buffer = 4 * (long long)slots;
@@ -57,6 +71,7 @@ auto then = [&]() -> scalar* { return state.positions.data + (1 - side) * buffer
 auto flip = [&]() { meet(); side = 1 - side; };
 scalar sine = state.oscillators.data[0], cosine = state.oscillators.data[1];
 real power = zero;
+look_up_origin(robot);
 
 auto slices = [=](auto work) __attribute__((always_inline)) {
     for (int slice = first_slice; slice < past_slice; ++slice)
@@ -64,12 +79,13 @@ auto slices = [=](auto work) __attribute__((always_inline)) {
 };
 auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__((always_inline)) {
     slices([&](Slot at) __attribute__((always_inline)) {
-        Vec v = load(state.velocities.data, at);
+        Vec low = low_at(at);
+        Sum v = velocity_at(at);
         real* const rest = in_slice(state.rests.data, at, 1);
         real left = CHIN4 && last ? *rest : zero;
-        move_slot(at, now(), then(), v, left, sine, cosine, shifted, time, start, last);
+        move_slot(at, now(), then(), low, v, left, sine, cosine, shifted, time, start, last);
         if (CHIN4 && !last) *rest = left;
-        store(state.velocities.data, at, v);
+        keep(at, low, v);
     });
     flip();
 };
@@ -79,7 +95,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last) {
 auto euler = [&]() { move(false, dt, false, true); };
 auto gradient_shift = [&]() {
     slices([&](Slot at) __attribute__((always_inline)) {
-        shift_slot(at, now(), then(), sine, cosine);
+        shift_slot(at, now(), then(), low_at(at), sine, cosine);
     });
     flip();
 };
@@ -88,15 +104,16 @@ auto enter_work = [](scalar) {};
 auto all_stopped = [=]() -> bool { return *health != 0; };
 auto check = [&](long long n) {
     int bits = 0;
-    slices([&](Slot at) { bits |= trouble(at, now(), load(state.velocities.data, at)); });
+    slices([&](Slot at) { bits |= trouble(at, now(), low_at(at), velocity_at(at)); });
     raise(state.flags.data, bits);
     meet();
     const int found = __atomic_load_n(state.flags.data, __ATOMIC_ACQUIRE);
     const bool stop = found != 0 || *health != 0;
     slices([&](Slot at) {
-        Vec v = load(state.velocities.data, at);
-        settle(at, stop, now(), then(), v);
-        store(state.velocities.data, at, v);
+        Vec low = low_at(at);
+        Sum v = velocity_at(at);
+        settle(at, stop, now(), then(), low, v);
+        keep(at, low, v);
     });
     meet();
     if (leader) {
@@ -105,8 +122,23 @@ auto check = [&](long long n) {
             state.state_times.data[0] = double(n) * run.exact_dt;
         }
         *state.flags.data = 0;
+        double sums[3] = {};
+        if (MIXED && !stop) {
+            add_positions(now(), slots, sums);
+            lead_origin(robot, sums);
+        }
     }
     meet();
+#if MIXED
+    if (stop) return;
+    look_up_origin(robot);
+    slices([&](Slot at) {
+        Vec low = low_at(at);
+        follow(at, now(), low);
+        store(state.low_positions.data, at, low);
+    });
+    meet();
+#endif
 };
 auto set_oscillators = [&](long long n) { oscillator(robot, n, sine, cosine); };
 auto turn_oscillators = [&]() { if (ACTUATED) turn(robot, sine, cosine); };
@@ -133,7 +165,7 @@ def threads(features: GatherFeatures) -> wp.Kernel:
     module = wp.get_module(features.name)
     wp.set_module_options(CPU_OPTIONS, module)
 
-    @wp.func_native(passes(features) + _THREADS + STEPS + _THREADS_END)
+    @wp.func_native(passes(features) + _KEPT + _THREADS + STEPS + _THREADS_END)
     def advance_body(
         model: Model,
         state: State,
@@ -193,7 +225,11 @@ const int slice = slot / SLICE;
 const int robot = model.slices.data[slice * SITE_COLUMNS];
 const Slot at = {slice, slot % SLICE, robot, slot, model.robots.data[robot * ROBOT_COLUMNS]};
 const bool leader = slot == at.base, stopped = state.states.data[robot] != 0;
+look_up_origin(robot);
 """
+
+#: Checks that only mixed precision needs.
+MIXED_ONLY = ("measure", "follow")
 
 _PASS = r"""
 const int side = (int)((n + PASS) & 1);
@@ -208,32 +244,34 @@ if (leader && ACTUATED) {
     next[0] = si; next[1] = co;
 }
 if (stopped || model.homes.data[slot] < 0) return;
-if (PASS == 1) shift_slot(at, now, then, sine, cosine);
+Vec low = low_at(at);
+if (PASS == 1) shift_slot(at, now, then, low, sine, cosine);
 else {
     const bool start = PASS == 0 && n == 0, last = !CHIN4 || PASS == 2;
     const scalar time = EULER ? dt : PASS == 2 ? GRADIENT_KICK
         : start ? FIRST_KICK : FIRST_KICK * scalar(2);
-    Vec v = load(state.velocities.data, at);
+    Sum v = velocity_at(at);
     real rest = CHIN4 && last ? state.rests.data[slot] : zero;
-    move_slot(at, now, then, v, rest, sine, cosine, PASS == 2, time, start, last);
+    move_slot(at, now, then, low, v, rest, sine, cosine, PASS == 2, time, start, last);
     if (CHIN4 && !last) state.rests.data[slot] = rest;
-    store(state.velocities.data, at, v);
+    keep(at, low, v);
 }
 """
 
 _FIND = r"""
 if (stopped) return;
 const scalar* const now = state.positions.data + (n & 1) * buffer;
-raise(state.flags.data + robot, trouble(at, now, load(state.velocities.data, at)));
+raise(state.flags.data + robot, trouble(at, now, low_at(at), velocity_at(at)));
 """
 
 _SETTLE = r"""
 const int side = (int)(n & 1);
 scalar* const now = state.positions.data + side * buffer;
-Vec v = load(state.velocities.data, at);
+Vec low = low_at(at);
+Sum v = velocity_at(at);
 settle(at, stopped || state.flags.data[robot] != 0, now,
-       state.positions.data + (1 - side) * buffer, v);
-store(state.velocities.data, at, v);
+       state.positions.data + (1 - side) * buffer, low, v);
+keep(at, low, v);
 """
 
 _WIND = r"""
@@ -244,6 +282,13 @@ if (found && state.states.data[robot] == 0) {
     state.states.data[robot] = status_of(found);
     state.state_times.data[robot] = double(n) * run.exact_dt;
 }
+if (MIXED && state.states.data[robot] == 0) {
+    const int* const about = model.robots.data + robot * ROBOT_COLUMNS;
+    double total[3] = {};
+    for (int c = about[4]; c < about[4] + about[5]; ++c)
+        for (int axis = 0; axis < 3; ++axis) total[axis] += sums.data[3 * c + axis];
+    lead_origin(robot, total);
+}
 if (ACTUATED) {
     scalar* const wave = state.oscillators.data + 2 * ((n & 1) * robots + robot);
     oscillator(robot, n, wave[0], wave[1]);
@@ -251,17 +296,36 @@ if (ACTUATED) {
 """
 
 
+# In mixed precision: sums of positions by chunks, and the shift to a moved origin.
+_MEASURE = r"""
+const long long n = clock.data[0] + offset;
+const int* const chunk = model.chunks.data + slot * CHUNK_COLUMNS;
+double* const total = sums.data + 3 * (long long)slot;
+total[0] = total[1] = total[2] = 0.0;
+add_positions(state.positions.data + 4 * ((n & 1) * (long long)slots + chunk[1]), chunk[2], total);
+"""
+
+_FOLLOW = r"""
+#if MIXED
+if (stopped || model.homes.data[slot] < 0) return;
+Vec low = low_at(at);
+follow(at, state.positions.data + (n & 1) * buffer, low);
+store(state.low_positions.data, at, low);
+#endif
+"""
+
+
 class Launches(NamedTuple):
-    """Kernels of one set of features, launched over slots, ``wind`` over robots.
+    """Kernels of one set of features.
 
     Attributes:
-        steps: The passes of a step, in order.
-        check: ``find``, ``settle`` and ``wind``, every ``CHECK_EVERY`` steps.
+        steps: The passes of a step, in order, over slots.
+        check: What is done every ``CHECK_EVERY`` steps, in order, and what each is launched over.
         tick: Moves the clock on.
     """
 
     steps: list[wp.Kernel]
-    check: list[wp.Kernel]
+    check: list[tuple[wp.Kernel, str]]
     tick: wp.Kernel
 
 
@@ -272,7 +336,7 @@ def launches(features: GatherFeatures) -> Launches:
     Run = run_type(features.precision)
     module = wp.get_module(features.name)
     wp.set_module_options({"enable_backward": False}, module)
-    text = passes(features)
+    text = passes(features) + _KEPT
 
     def kernel(name: str, snippet: str) -> wp.Kernel:
         @wp.func_native(text + snippet)
@@ -283,6 +347,7 @@ def launches(features: GatherFeatures) -> Launches:
             slots: int,
             robots: int,
             clock: wp.array(dtype=wp.int64),
+            sums: wp.array(dtype=wp.float64),
             offset: int,
             slot: int,
         ): ...
@@ -295,9 +360,10 @@ def launches(features: GatherFeatures) -> Launches:
             slots: int,
             robots: int,
             clock: wp.array(dtype=wp.int64),
+            sums: wp.array(dtype=wp.float64),
             offset: int,
         ):
-            work(model, state, run, slots, robots, clock, offset, wp.tid())
+            work(model, state, run, slots, robots, clock, sums, offset, wp.tid())
 
         return launch
 
@@ -311,8 +377,12 @@ def launches(features: GatherFeatures) -> Launches:
         if features.integrator in integrators
     ]
     check = [
-        kernel("find", _LAUNCHES + _FIND),
-        kernel("settle", _LAUNCHES + _SETTLE),
-        kernel("wind", _WIND),
+        (kernel("find", _LAUNCHES + _FIND), "slots"),
+        (kernel("settle", _LAUNCHES + _SETTLE), "slots"),
+        (kernel("measure", _MEASURE), "chunks"),
+        (kernel("wind", _WIND), "robots"),
+        (kernel("follow", _LAUNCHES + _FOLLOW), "slots"),
     ]
+    if features.precision != "mixed":
+        check = [(kernel, over) for kernel, over in check if kernel.key not in MIXED_ONLY]
     return Launches(steps, check, tick)

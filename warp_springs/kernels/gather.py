@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warp_springs.kernels.buffers import REAL, array_struct, real_type, struct_of
+from warp_springs.kernels.buffers import REAL, array_struct, real_dtype, real_type, struct_of
 from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.dialect import (
     native_width,
@@ -38,7 +38,6 @@ __all__ = [
     "CHUNK",
     "LOOKS",
     "MODEL",
-    "REASONS",
     "ROBOT",
     "SITE",
     "SLICE",
@@ -57,6 +56,7 @@ SLICE = 8
 #: Columns of the table of robots.
 ROBOT = (
     "first",  # first slot
+    "masses",
     "place",  # where its positions start in what is seen, in the user's order
     "lane",  # its place where what is seen has one value a robot
     "chunk",  # first chunk, see kernels.look
@@ -86,6 +86,7 @@ MODEL = {
     "omegas": np.float64,  # rad/s
     "turns": REAL,  # cos(w dt), sin(w dt) of half a step of chin4, or of a step
     "reaches2": REAL,  # square of the length that stops a robot, m^2
+    "quanta": REAL,  # in which the origin of a robot moves, m; in mixed precision
 }
 #: What stepping changes.
 STATE = {
@@ -93,6 +94,14 @@ STATE = {
     "velocities": REAL,  # [slice][3][slot], m/s
     "good_positions": REAL,  # at the last check that found the robot healthy
     "good_velocities": REAL,
+    # In mixed precision: what a single number does not hold of them, the origins of the positions
+    # and how they move.
+    "low_positions": REAL,
+    "low_velocities": REAL,
+    "good_low_positions": REAL,
+    "good_low_velocities": REAL,
+    "origins": np.float64,  # m
+    "shifts": REAL,  # m
     "rests": REAL,  # impulse left over for friction, within a step of chin4
     "ledgers": REAL,  # [slice][4][slot], J
     "good_ledgers": REAL,
@@ -101,10 +110,6 @@ STATE = {
     "state_times": np.float64,  # s
     "flags": np.int32,  # reasons to stop a robot, found by the check; and by a look
 }
-
-#: Status for each reason, from the weakest bit to the strongest: too deep, overstretched, too fast,
-#: not finite.
-REASONS = (4, 2, 3, 1)
 
 
 @dataclass(frozen=True)
@@ -130,7 +135,8 @@ class GatherFeatures(Features):
     @property
     def together(self) -> int:
         """Springs whose coefficients fill 16 bytes, which a GPU loads at once."""
-        return 2 if not self.vector and not self.actuated and self.precision == "float32" else 1
+        small = real_dtype(self.precision).itemsize == 4
+        return 2 if small and not self.vector and not self.actuated else 1
 
 
 def slice_width(layout: str, precision: str) -> int:
@@ -166,11 +172,21 @@ def passes(features: GatherFeatures) -> str:
         loads = quad_operations(features.width) + _vector_loads(features.width)
     else:
         dialect, loads = scalar_dialect(features.precision), _SCALAR_LOADS
-    return dialect + flags + "\n".join(lines) + LAW + _SLOT + loads + _PASSES
+    return dialect + flags + "\n".join(lines) + _ORIGIN + LAW + _SLOT + loads + _PASSES
 
 
 _TABLES = {"robot": ROBOT, "site": SITE, "chunk": CHUNK}
 
+
+# The origin of the robot's positions, as the law sees it.
+_ORIGIN = r"""
+real origins_here[3] = {};
+real* const origin = origins_here;
+auto look_up_origin = [=](int robot) {
+    for (int c = 0; MIXED && c < 3; ++c)
+        origin[c] = zero + scalar(state.origins.data[3 * robot + c]);
+};
+"""
 
 # Where a thread works: one slot of a slice, or, where the slots are lanes, all of them (lane 0).
 # `own` is its place in the buffers of positions, and `base` that of its robot's first slot.
@@ -301,6 +317,17 @@ auto store = [=](scalar* values, Slot at, Vec a) __attribute__((always_inline)) 
     real* const p = in_slice(values, at, 3);
     p[0] = a.x; p[STRIDE] = a.y; p[2 * STRIDE] = a.z;
 };
+auto load_sum = [=](scalar* values, scalar* lows, Slot at) __attribute__((always_inline)) -> Sum {
+    const Vec a = load(values, at), low = MIXED ? load(lows, at) : Vec{};
+    return sum_of(&a, &low, 0);
+};
+auto store_sum = [=](scalar* values, scalar* lows, Slot at, const Sum& sum)
+        __attribute__((always_inline)) {
+    Vec a, low = {};
+    keep_sum(&a, &low, 0, sum);
+    store(values, at, a);
+    if (MIXED) store(lows, at, low);
+};
 // Half of the power of each breathing spring belongs to either end.
 struct Force { Vec f; real power; };
 auto gather = [=](Slot at, const scalar* where, Vec a, scalar sine, scalar cosine)
@@ -324,6 +351,13 @@ auto gather = [=](Slot at, const scalar* where, Vec a, scalar sine, scalar cosin
 auto choose = [=](mask m, Vec a, Vec b) __attribute__((always_inline)) -> Vec {
     return Vec{select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
 };
+#if MIXED
+auto choose_sum = [=](mask m, const Sum& a, const Sum& b) __attribute__((always_inline)) -> Sum {
+    return Sum{choose(m, a, b), choose(m, a.low, b.low)};
+};
+#else
+auto choose_sum = choose;
+#endif
 
 // Energies that a mass exchanged, kept by mass: work, damping, drag, friction.
 struct Accounts { real values[4]; };
@@ -338,7 +372,8 @@ auto close_accounts = [=](scalar* kept, Slot at, Accounts accounts)
 };
 
 // The reasons, as bits of REASONS, why the robot of a slot must be stopped.
-auto trouble = [=](Slot at, const scalar* where, Vec v) __attribute__((always_inline)) -> int {
+auto trouble = [=](Slot at, const scalar* where, Vec low, Vec v)
+        __attribute__((always_inline)) -> int {
     real w;
     const Vec a = own_quad(where, at, w);
     const real reach2 = zero + model.reaches2.data[at.robot];
@@ -348,8 +383,9 @@ auto trouble = [=](Slot at, const scalar* where, Vec v) __attribute__((always_in
         const Vec d = b - a;
         stretched |= squared_length(d.x, d.y, d.z) > reach2;
     });
-    return (GROUND && any(a.z < -depth_limit) ? 1 : 0) | (any(stretched) ? 2 : 0)
-        | (any(fast) ? 4 : 0) | (any(poison_of(a, v) != zero) ? 8 : 0);
+    const bool deep = GROUND && any(in_world(sum_of(&a, &low, 0)).z < -depth_limit);
+    return (deep ? 1 : 0) | (any(stretched) ? 2 : 0) | (any(fast) ? 4 : 0)
+        | (any(poison_of(a, v) != zero) ? 8 : 0);
 };
 auto status_of = [](int reasons) -> int {
     return reasons & 8 ? 1 : reasons & 4 ? 3 : reasons & 2 ? 2 : reasons ? 4 : 0;
@@ -381,43 +417,48 @@ auto turn = [=](int robot, scalar& sine, scalar& cosine) {
 };
 
 // Keeps the state of a healthy robot as good, and brings a stopped one back to where it was.
-auto settle = [=](Slot at, bool stop, scalar* one, scalar* other, Vec& v)
+auto settle = [=](Slot at, bool stop, scalar* one, scalar* other, Vec& low, Sum& v)
         __attribute__((always_inline)) {
     real w;
     const Vec a = own_quad(one, at, w);
     Accounts now = open_accounts(state.ledgers.data, at);
     if (!stop) {
         store(state.good_positions.data, at, a);
-        store(state.good_velocities.data, at, v);
+        if (MIXED) store(state.good_low_positions.data, at, low);
+        store_sum(state.good_velocities.data, state.good_low_velocities.data, at, v);
         close_accounts(state.good_ledgers.data, at, now);
         return;
     }
     const Vec good = load(state.good_positions.data, at);
     keep_quad(one, at, good, w);
     keep_quad(other, at, good, w);
-    v = load(state.good_velocities.data, at);
+    if (MIXED) low = load(state.good_low_positions.data, at);
+    v = load_sum(state.good_velocities.data, state.good_low_velocities.data, at);
     close_accounts(state.ledgers.data, at, open_accounts(state.good_ledgers.data, at));
 };
 // One kick by the springs and its drift, from the positions `now` into the buffer `then`, which
 // holds the positions if the springs pull where the gradient kick looks.
-auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& v, real& rest, scalar sine,
-                     scalar cosine, bool shifted, scalar time, bool start, bool last)
+auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v, real& rest,
+                     scalar sine, scalar cosine, bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
     const Force sum = gather(at, now, here, sine, cosine);
-    Vec a = shifted ? own_quad(then, at, w) : here;
-    const Vec x_before = a, v_before = v;
+    const Vec high = shifted ? own_quad(then, at, w) : here;
+    Sum a = sum_of(&high, &low, 0);
+    const Sum x_before = a, v_before = v;
     Accounts accounts = open_accounts(state.ledgers.data, at);
     if (LEDGER && ACTUATED && !shifted) accounts.values[0] += sum.power * time;
     if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values);
     else move_mass(a, v, sum.f, w, run.substeps, rest, time, start, last, accounts.values);
     close_accounts(state.ledgers.data, at, accounts);
     const mask is_mass = w > zero;
-    v = choose(is_mass, v, v_before);
-    keep_quad(then, at, choose(is_mass, a, x_before), w);
+    v = choose_sum(is_mass, v, v_before);
+    Vec x;
+    keep_sum(&x, &low, 0, choose_sum(is_mass, a, x_before));
+    keep_quad(then, at, x, w);
 };
-auto shift_slot = [=](Slot at, const scalar* now, scalar* then, scalar sine, scalar cosine)
+auto shift_slot = [=](Slot at, const scalar* now, scalar* then, Vec low, scalar sine, scalar cosine)
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
@@ -427,9 +468,41 @@ auto shift_slot = [=](Slot at, const scalar* now, scalar* then, scalar sine, sca
         accounts.values[0] += sum.power * GRADIENT_KICK;
         close_accounts(state.ledgers.data, at, accounts);
     }
-    const Vec a = shifted_position(here, sum.f, w);
+    const Vec a = shifted_position(sum_of(&here, &low, 0), sum.f, w);
     keep_quad(then, at, choose(w > zero, a, here), w);
 };
+
+// In mixed precision the origin follows a robot whose centre has left it by more than a quantum, in
+// whole quanta. Sums of positions first; padding is at zero.
+auto add_positions = [=](const scalar* quads, int slots, double* sums) {
+    for (int i = 0; i < slots; ++i)
+        for (int c = 0; c < 3; ++c) sums[c] += double(quads[4 * i + c]);
+};
+auto lead_origin = [=](int robot, const double* sums) {
+    const double quantum = double(model.quanta.data[robot]);
+    for (int c = 0; c < 3; ++c) {
+        const double middle = sums[c] / double(model.robots.data[robot * ROBOT_COLUMNS + 1]);
+        const bool away = middle > quantum || middle < -quantum;
+        const double shift = away ? ::rint(middle / quantum) * quantum : 0.0;
+        state.shifts.data[3 * robot + c] = scalar(shift);
+        state.origins.data[3 * robot + c] += shift;
+    }
+};
+#if MIXED
+auto follow = [=](Slot at, scalar* where, Vec& low) __attribute__((always_inline)) {
+    const scalar* const shift = state.shifts.data + 3 * at.robot;
+    if (shift[0] == scalar(0) && shift[1] == scalar(0) && shift[2] == scalar(0)) return;
+    real w;
+    Vec a = own_quad(where, at, w);
+    const mask is_mass = w > zero;
+    move_origin(a.x, low.x, select(is_mass, zero + shift[0], zero));
+    move_origin(a.y, low.y, select(is_mass, zero + shift[1], zero));
+    move_origin(a.z, low.z, select(is_mass, zero + shift[2], zero));
+    keep_quad(where, at, a, w);
+    store(state.good_positions.data, at, a);
+    store(state.good_low_positions.data, at, low);
+};
+#endif
 """
 
 
@@ -438,7 +511,8 @@ def gather_structs(precision: str) -> tuple[type, type]:
     """The structs of what stays and of what stepping changes."""
 
     def struct(name: str, table: dict) -> type:
-        kinds = {key: np.dtype(precision if k is REAL else k) for key, k in table.items()}
+        real = real_dtype(precision)
+        kinds = {key: real if kind is REAL else np.dtype(kind) for key, kind in table.items()}
         return array_struct(name, kinds)
 
     return struct("Crowd", MODEL), struct("CrowdState", STATE)

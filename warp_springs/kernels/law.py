@@ -90,6 +90,13 @@ auto sum_of = [](const Vec* a, const Vec* low, int i) __attribute__((always_inli
 auto keep_sum = [](Vec* a, Vec* low, int i, const Sum& sum) __attribute__((always_inline)) {
     a[i] = sum; low[i] = sum.low;
 };
+// The origin moves: what a shifted position cannot hold goes to its low part.
+auto move_origin = [](real& a, real& low, real by) __attribute__((always_inline)) {
+    const real sum = a - by, part = sum - a;
+    const real rest = low + ((a - (sum - part)) - (by + part));
+    a = sum + rest;
+    low = rest - (a - sum);
+};
 // Where a mass is in the world; its height is exact near the ground.
 auto in_world = [=](const Sum& x) __attribute__((always_inline)) -> Vec {
     return Vec{x.x + origin[0], x.y + origin[1], (x.z + origin[2]) + x.low.z};

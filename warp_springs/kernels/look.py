@@ -25,11 +25,13 @@ const Slot at = {slice, index % (SLICE / W), robot, index * W,
 if (!wanted.data[robot]) return;
 const scalar* const now = state.positions.data + side * 4 * (long long)slots;
 int* const flag = state.flags.data + robots + robot;
+look_up_origin(robot);
 const bool was_stopped = state.states.data[robot] != 0, stopped = was_stopped || *flag != 0;
 """
 
 _FIND = r"""
-if (!was_stopped) raise(flag, trouble(at, now, load(state.velocities.data, at)));
+if (!was_stopped) raise(flag, trouble(at, now, MIXED ? load(state.low_positions.data, at) : Vec{},
+                                load(state.velocities.data, at)));
 """
 
 _SHOW = r"""
@@ -41,20 +43,24 @@ keep_quad(shown.data, at, a, w);
 
 _LOOK = r"""
 real w;
-const Vec a = own_quad(shown.data, at, w), u = load(state.velocities.data, at);
+const Vec a = own_quad(shown.data, at, w);
+const Vec low = MIXED ? load(stopped ? state.good_low_positions.data : state.low_positions.data, at)
+                      : Vec{};
+const Sum x = sum_of(&a, &low, 0);
+const Sum u = load_sum(state.velocities.data, state.low_velocities.data, at);
 const scalar sine = state.oscillators.data[2 * ((long long)side * robots + robot)];
 const scalar cosine = state.oscillators.data[2 * ((long long)side * robots + robot) + 1];
 const real si = zero + sine, co = zero + cosine;
 const Force sum = gather(at, shown.data, a, sine, cosine);
-Vec v = u;
+Sum v = u;
 Losses losses = {};
 Accounts accounts = open_accounts(stopped ? state.good_ledgers.data : state.ledgers.data, at);
-if (!EULER && step > 0) synchronise(v, sum.f, w, a.z, losses);
+if (!EULER && step > 0) synchronise(v, sum.f, w, in_world(x).z, losses);
 if (LEDGER && !stopped) {
     enter(accounts.values, losses, u, v, w);
     if (ACTUATED && !EULER && step > 0) accounts.values[0] += sum.power * FIRST_KICK;
 }
-if (stopped) v = load(state.good_velocities.data, at);
+if (stopped) v = load_sum(state.good_velocities.data, state.good_low_velocities.data, at);
 real springs = zero;
 if (LEDGER)
     each_spring(at, shown.data, [&](Vec b, real k, real ha, real hs, real hc) {
@@ -63,8 +69,15 @@ if (LEDGER)
                                  ACTUATED ? breathing(ha, hs, hc, si, co) : ha) * scalar(0.5);
     });
 const real m = (zero + scalar(1)) / w;
-const real energies[4] = {kinetic_energy(v, m), gravity_energy(a, m), springs,
-                          GROUND ? ground_energy(a.z) : zero};
+const real energies[4] = {kinetic_energy(v, m), gravity_energy(in_world(x), m), springs,
+                          GROUND ? ground_energy(in_world(x).z) : zero};
+Vec parts_of_x[2] = {}, parts_of_v[2] = {};
+keep_sum(parts_of_x, parts_of_x + 1, 0, x);
+keep_sum(parts_of_v, parts_of_v + 1, 0, v);
+// A component in the world: high and low part, and the origin.
+auto shown_number = [=](real high, real low, int lane, double from) -> wide_scalar {
+    return wide_scalar(from) + (wide_scalar(lane_of(high, lane)) + wide_scalar(lane_of(low, lane)));
+};
 for (int l = 0; l < W; ++l) {
     const int slot = slice * SLICE + at.lane + l, home = model.homes.data[slot];
     double* const out = parts.data + LOOKS * (long long)slot;
@@ -72,19 +85,24 @@ for (int l = 0; l < W; ++l) {
         for (int e = 0; e < LOOKS; ++e) out[e] = 0.0;
         continue;
     }
-    const long long place = model.robots.data[robot * ROBOT_COLUMNS + 1] + 3 * (long long)home;
-    const Vec* const both[2] = {&a, &v};
-    scalar* const seen_in[2] = {seen.seen_positions.data, seen.seen_velocities.data};
-    for (int q = 0; q < 2; ++q) {
-        seen_in[q][place] = lane_of(both[q]->x, l);
-        seen_in[q][place + 1] = lane_of(both[q]->y, l);
-        seen_in[q][place + 2] = lane_of(both[q]->z, l);
-    }
+    const long long place = model.robots.data[robot * ROBOT_COLUMNS + 2] + 3 * (long long)home;
+    double from[3] = {};
+    for (int c = 0; MIXED && c < 3; ++c) from[c] = state.origins.data[3 * robot + c];
+    const Vec &p = parts_of_x[0], &p_low = parts_of_x[1];
+    const Vec &q = parts_of_v[0], &q_low = parts_of_v[1];
+    const wide_scalar at_place[3] = {shown_number(p.x, p_low.x, l, from[0]),
+                                     shown_number(p.y, p_low.y, l, from[1]),
+                                     shown_number(p.z, p_low.z, l, from[2])};
+    const wide_scalar moving[3] = {shown_number(q.x, q_low.x, l, 0.0),
+                                   shown_number(q.y, q_low.y, l, 0.0),
+                                   shown_number(q.z, q_low.z, l, 0.0)};
     const double mass = 1.0 / double(lane_of(w, l));
     out[0] = mass;
-    out[1] = mass * double(lane_of(a.x, l));
-    out[2] = mass * double(lane_of(a.y, l));
-    out[3] = mass * double(lane_of(a.z, l));
+    for (int c = 0; c < 3; ++c) {
+        seen.seen_positions.data[place + c] = at_place[c];
+        seen.seen_velocities.data[place + c] = moving[c];
+        out[1 + c] = mass * double(at_place[c]);
+    }
     for (int e = 0; LEDGER && e < 4; ++e) {
         out[4 + e] = double(lane_of(energies[e], l));
         out[8 + e] = double(lane_of(accounts.values[e], l));
@@ -108,14 +126,14 @@ _REPORT = r"""
 const int robot = index;
 if (!wanted.data[robot]) return;
 const int* const about = model.robots.data + robot * ROBOT_COLUMNS;
-const int lane = about[2];
+const int lane = about[3];
 int* const flag = state.flags.data + robots + robot;
 double total[LOOKS] = {};
 for (int e = 0; e < (LEDGER ? LOOKS : 4); ++e)
-    for (int c = about[3]; c < about[3] + about[4]; ++c)
+    for (int c = about[4]; c < about[4] + about[5]; ++c)
         total[e] += sums.data[LOOKS * (long long)c + e];
 for (int axis = 0; axis < 3; ++axis)
-    seen.seen_centers.data[3 * lane + axis] = scalar(total[1 + axis] / total[0]);
+    seen.seen_centers.data[3 * lane + axis] = wide_scalar(total[1 + axis] / total[0]);
 for (int e = 0; LEDGER && e < 8; ++e)
     seen.seen_energies.data[8 * lane + e] = scalar(total[4 + e]);
 const int health = state.states.data[robot];
