@@ -59,7 +59,7 @@ def test_mp4_plays_everywhere_and_shows_the_pictures(walk, tmp_path):
     film = Film(walk, [0, 1], Look(), Cut(fps=20), Rasteriser(SIZE))
     for k in (0, 7, 14):
         error = film.picture(k).astype(float) - frames[k]
-        assert np.abs(error).mean() < 5.0  # colours have half the resolution
+        assert np.abs(error).mean() < 7.0  # colours have half the resolution
         assert np.abs(error.mean(axis=(0, 1))).max() < 1.5  # and the right matrix and range
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
@@ -82,7 +82,7 @@ def test_webp_has_all_pictures_for_the_right_time(walk, tmp_path):
         for k in range(18):
             image.seek(k)
             pixels = np.asarray(image.convert("RGB"), float)
-            assert np.abs(pixels - film.picture(k)).mean() < 5.0
+            assert np.abs(pixels - film.picture(k)).mean() < 7.0
             total += image.info["duration"]
     assert total == 750
 
@@ -121,7 +121,7 @@ def director(result, **options):
     cut = Cut(**{k: v for k, v in options.items() if k in ("follow", "turns")})
     look = Look(camera=options.get("camera"))
     actors = actors_of(result, [0], look, None, film=True)
-    return actors[0], Director(actors, SIZE, look, cut, floor=True)
+    return actors[0], Director(actors, SIZE, look, cut, result.scene)
 
 
 @pytest.mark.parametrize("camera", [None, Camera(eye=(2.0, -2.0, 1.0))])

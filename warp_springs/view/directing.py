@@ -8,13 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_springs.io.usd_layout import placed
+from warp_springs.scene import Scene
 from warp_springs.view.actors import Actor, FloatArray
 from warp_springs.view.camera import Camera
 from warp_springs.view.look import Cut, Look
+from warp_springs.view.props import NEAR, corners_near
 
 _VIEW_OF_ONE = {"azimuth": -58.0, "elevation": 25.0, "margin": 1.6}
 _VIEW_OF_MANY = {"azimuth": -77.0, "elevation": 37.0, "margin": 1.1}
 _VIEW_OF_TILE = {"azimuth": -58.0, "elevation": 25.0, "margin": 1.45}
+_MARGIN_OF_PROPS = 1.15
 _SAMPLES = 40
 _RING = 24
 
@@ -28,8 +31,8 @@ class Director:
         size: tuple[int, int],
         look: Look,
         cut: Cut,
+        scene: Scene,
         *,
-        floor: bool,
         tile: bool = False,
     ):
         """Look through the whole film once.
@@ -39,13 +42,13 @@ class Director:
             size: Of the picture in pixels.
             look: Its azimuth, elevation and camera are kept where they are given.
             cut: Whether the camera follows and turns.
-            floor: Whether there is a floor: then the camera keeps its height.
+            scene: With a floor the camera keeps its height; obstacles nearby are shown.
             tile: Whether the picture is one of several in a panel.
         """
         self._actors, self._size, self._look, self._turns = actors, size, look, cut.turns
         self._times = actors[0].times
         way = np.mean([a.calm_way + a.offset for a in actors], axis=0)
-        if floor:
+        if scene.ground is not None:
             way[:, 2] = 0.0
         self._way = way if cut.follow else np.tile(way[:1], (len(way), 1))
         view = _VIEW_OF_TILE if tile else _VIEW_OF_ONE if len(actors) == 1 else _VIEW_OF_MANY
@@ -54,7 +57,7 @@ class Director:
             self._view["azimuth"] = look.azimuth
         if look.elevation is not None:
             self._view["elevation"] = look.elevation
-        self._points, self._radii = self._seen_around_the_way()
+        self._points, self._radius = self._seen_around_the_way(scene)
 
     def way(self, time: float) -> FloatArray:
         """Return the place that the camera follows [m], (3,)."""
@@ -67,31 +70,36 @@ class Director:
             return _moved(self._look.camera, self.way(time) - self.way(self._times[0]), turn)
         view = {**self._view, "azimuth": self._view["azimuth"] + turn}
         points = _turned(self._points, turn) if self._turns else self._points
-        camera = Camera.framing(points, self._size, radius=self._radii, **view)
+        camera = Camera.framing(points, self._size, radius=self._radius, **view)
         return _moved(camera, self.way(time), 0.0)
 
     def stand_back(self, factor: float) -> None:
         """Leave more room around the robots."""
         self._view["margin"] *= factor
 
-    def _seen_around_the_way(self) -> tuple[FloatArray, FloatArray]:
-        """Return all places of spheres, (P, 3), as seen from what the camera follows; radii."""
+    def _seen_around_the_way(self, scene: Scene) -> tuple[FloatArray, float]:
+        """Return what is to be seen, (P, 3) m from what the camera follows, and its margin [m]."""
         steps = np.unique(np.linspace(0, len(self._times) - 1, _SAMPLES).astype(int))
-        points, radii = [], []
+        points, props = [], []
         for actor in self._actors:
             around = actor.frames[steps] + actor.offset - self._way[steps, None]
             points.append(around.reshape(-1, 3))
-            radii.append(np.full(len(points[-1]), actor.ball))
-        points, radii = np.concatenate(points), np.concatenate(radii)
+            reach = NEAR * actor.body.diameter
+            for k in steps if scene.obstacles else ():
+                corners = corners_near(scene.obstacles, actor.calm_way[k], reach)
+                props.append(corners + actor.offset - self._way[k])
+        if sum(map(len, props)):
+            self._view["margin"] = min(self._view["margin"], _MARGIN_OF_PROPS)
+        points, radius = np.concatenate(points + props), max(a.ball for a in self._actors)
         if not self._turns:
-            return points, radii
+            return points, radius
         # seen from all sides alike: a cylinder around what is turned about
         reach = float(np.linalg.norm(points[:, :2], axis=1).max())
         angle = np.arange(_RING) * (2 * math.pi / _RING)
         ring = np.column_stack((reach * np.cos(angle), reach * np.sin(angle)))
         heights = points[:, 2].min(), points[:, 2].max()
         ring = np.concatenate([np.column_stack((ring, np.full(_RING, z))) for z in heights])
-        return ring, np.full(len(ring), radii.max())
+        return ring, radius
 
 
 def put_on_grid(actors: Sequence[Actor]) -> FloatArray:

@@ -24,8 +24,6 @@ Pixels = NDArray[np.uint8]
 
 _LETTERS_PER_HEIGHT = 1 / 40
 _SMALLEST_LETTERS = 9
-_SURROUNDED = 1.5
-"""How much farther away the camera stands to show obstacles too."""
 _GUTTER = 4
 _GUTTER_COLOR = (250, 251, 252)
 _TILE_MAP = 512
@@ -71,7 +69,7 @@ class Shot:
         self._rasteriser, self._tile = rasteriser, tile
         self._floor = scene.ground is not None
         self._setting = {"size": rasteriser.size, "look": look, "cut": cut}
-        self._setting |= {"floor": self._floor, "tile": tile}
+        self._setting |= {"scene": scene, "tile": tile}
         letters = max(_SMALLEST_LETTERS, round(rasteriser.size[1] * _LETTERS_PER_HEIGHT))
         letters = max(letters, 14) if tile else letters
         self._images = [texts.text_image(label, letters) for label in labels or ()]
@@ -95,7 +93,7 @@ class Shot:
 
     def _direct(self, back: float = 1.0) -> None:
         self.director = Director(self.actors, **self._setting)
-        self.director.stand_back(back * (_SURROUNDED if self._scene.obstacles else 1.0))
+        self.director.stand_back(back)
         self._hang_labels()
 
     def _make_room(self, cells: FloatArray | None) -> None:

@@ -19,6 +19,9 @@ FloatArray = NDArray[np.float64]
 
 Obstacle = Plane | Sphere | Box | HeightField
 
+NEAR = 3.0
+"""How far away obstacles are shown and throw shadows, in sizes of the robots."""
+
 _NOWHERE = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _TILES, _MOST_TILES = 12, 60
 _ARROW_SIDES = 20
@@ -100,16 +103,15 @@ def add_obstacles(
             part is drawn.
         reach: How far around it they are drawn [m].
         tile: Edge of the tiles of their checker [m].
-        sink: How far surfaces are drawn inside of where masses stop [m]: the radius of the
-            spheres that stand for masses, which then rest on them.
+        sink: How far surfaces are drawn below where masses stop [m], as the floor is: the radius
+            of the spheres that stand for masses, which then rest on them.
         offset: How far this world is moved to its place in the picture [m], (3,).
     """
     pieces.origin = offset
     for obstacle in obstacles:
         if isinstance(obstacle, Sphere):
-            first = pieces.points([obstacle.center])
-            radius = max(obstacle.radius - sink, 1e-9)
-            pieces.balls([first], radius, appearance.OBSTACLE)
+            first = pieces.points([np.subtract(obstacle.center, (0.0, 0.0, sink))])
+            pieces.balls([first], obstacle.radius, appearance.OBSTACLE)
         elif isinstance(obstacle, Box):
             _add_box(pieces, obstacle, sink)
         elif isinstance(obstacle, Plane):
@@ -117,6 +119,35 @@ def add_obstacles(
         elif isinstance(obstacle, HeightField):
             _add_heights(pieces, obstacle, sink)
     pieces.origin = np.zeros(3)
+
+
+def corners_near(obstacles: Iterable[Obstacle], around: FloatArray, reach: float) -> FloatArray:
+    """Return the corners of boxes around the spheres and boxes near a point, (8 K, 3) m.
+
+    Args:
+        obstacles: Of a scene.
+        around: The point [m], (3,).
+        reach: What is larger or farther away than this is left out [m].
+    """
+    found = [np.zeros((0, 3))]
+    for obstacle in obstacles:
+        if not is_near(obstacle, around, reach):
+            continue
+        if isinstance(obstacle, Sphere):
+            obstacle = Box(center=obstacle.center, size=(2.0 * obstacle.radius,) * 3)
+        found.append(obstacle_mesh(obstacle, _NOWHERE)[0])
+    return np.concatenate(found)
+
+
+def is_near(obstacle: Obstacle, around: FloatArray, reach: float) -> bool:
+    """Whether an obstacle is a sphere or a box that is smaller than a reach [m] and within it."""
+    if isinstance(obstacle, Sphere):
+        size = obstacle.radius
+    elif isinstance(obstacle, Box):
+        size = float(np.linalg.norm(obstacle.size)) / 2
+    else:
+        return False
+    return size < reach and float(np.linalg.norm(np.subtract(obstacle.center, around))) < reach
 
 
 def add_forces(
@@ -177,8 +208,9 @@ def _add_arrow(
 
 
 def _add_box(pieces: Pieces, box: Box, sink: float) -> None:
-    smaller = replace(box, size=tuple(np.maximum(np.array(box.size) - 2 * sink, 1e-9)))
-    points, corners = obstacle_mesh(smaller, _NOWHERE)
+    size = np.maximum(np.array(box.size) - (2 * sink, 2 * sink, 0.0), 1e-9)
+    center = np.array(box.center) - sink * box.rotation[:, 2]
+    points, corners = obstacle_mesh(replace(box, size=size, center=center), _NOWHERE)
     pieces.triangles(pieces.points(points) + corners, appearance.OBSTACLE)
 
 

@@ -7,17 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_springs.scene import Scene
-from warp_springs.surfaces import Box, Sphere
 from warp_springs.view import appearance
 from warp_springs.view.actors import Actor, FloatArray
 from warp_springs.view.look import Look
-from warp_springs.view.props import Obstacle, Pieces, add_forces, add_obstacles
+from warp_springs.view.props import NEAR, Pieces, add_forces, add_obstacles, is_near
 from warp_springs.view.rasteriser import Drawing
 
 _ENDLESS = 8.0
 """Half the side of what is drawn of endless things, in sizes of what is shown."""
-_NEAR = 3.0
-"""How far away obstacles throw shadows, in sizes of what is shown."""
 
 
 def draw_scene(actors: Sequence[Actor], scene: Scene, look: Look, time: float) -> Drawing:
@@ -46,7 +43,7 @@ def draw_scene(actors: Sequence[Actor], scene: Scene, look: Look, time: float) -
             low, high = box.min(axis=0) - offset, box.max(axis=0) - offset
             size = max(float(np.linalg.norm(high - low)), *sizes)
             around = (low + high) / 2
-            chosen = [o for o in scene.obstacles if _casts(o, around, _NEAR * size) == casting]
+            chosen = [o for o in scene.obstacles if is_near(o, around, NEAR * size) == casting]
             add_obstacles(pieces, chosen, around, _ENDLESS * size, tile, largest, offset)
         if casting:
             pieces.end_of_casters()
@@ -66,17 +63,6 @@ def _add_body(pieces: Pieces, actor: Actor, positions: FloatArray, time: float, 
         color = np.tile(np.float32(appearance.MASS), (body.n_masses, 1))
         color[body.elements.bonds.masses] = appearance.HELD
         pieces.balls(first + np.arange(body.n_masses), actor.ball, color)
-
-
-def _casts(obstacle: Obstacle, around: FloatArray, reach: float) -> bool:
-    """Whether an obstacle throws a shadow: a sphere or a box that is near enough."""
-    if isinstance(obstacle, Sphere):
-        size = obstacle.radius
-    elif isinstance(obstacle, Box):
-        size = float(np.linalg.norm(obstacle.size)) / 2
-    else:
-        return False
-    return size < reach and float(np.linalg.norm(np.subtract(obstacle.center, around))) < reach
 
 
 def _places(actors: Sequence[Actor]) -> FloatArray:
