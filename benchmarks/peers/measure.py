@@ -1,6 +1,7 @@
 """Check, then time: the same population in every program, in turns."""
 
 import dataclasses
+import functools
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,9 +13,11 @@ from peers.fleet import Fleet, Program
 from peers.problem import Problem
 from peers.programs.in_numpy import NumPy
 
-__all__ = ["ALLOWED", "FEATURES", "Row", "compare"]
+__all__ = ["ALLOWED", "CHECKED_STEPS", "FEATURES", "Row", "Truth", "compare"]
 
 FEATURES = "ground, classroom friction, damping, actuation; symplectic Euler, dt 1e-4 s"
+#: Steps until the check: robots land after 100, and slide or stick.
+CHECKED_STEPS = 200
 #: How far centers of mass may be from the truth [m]. In float32 a mass near the stick limit may
 #: flip a step earlier, so the typical robot must agree, in float64 every one.
 ALLOWED = {"float64": 1e-10, "float32": 1e-6}
@@ -57,42 +60,61 @@ class Row:
         return float(np.median(np.divide(self.rates, other.rates)))
 
 
-def compare(
-    fleet: Fleet,
-    problem: Problem,
-    precision: str,
-    steps: int,
-    rounds: int,
-    seconds: float,
-    say: Callable[[str], None],
-) -> list[Row]:
-    """A row for each program: checked after ``steps``, then timed for ``seconds`` a round."""
-    rows = [Row(p, precision) for p in fleet.programs if precision in p.precisions]
-    free = dataclasses.replace(problem, ground_stiffness=0.0, keep=1.0)
-    truth = _centers(problem, steps)
-    flight = _centers(free, steps)
-    with tempfile.TemporaryDirectory() as folder:
-        scene, flying = Path(folder, "scene.npz"), Path(folder, "free.npz")
-        problem.save(scene)
-        free.save(flying)
-        for row in rows:
-            say(f"checking {row.program.name} on {row.program.threads}")
-            try:
-                if row.program.differs:
-                    _check(fleet, row, flying, flight, steps)
-                _check(fleet, row, scene, truth, steps)
-                _time(fleet, row, 0.1)  # warm, at the pace without the first calls
-            except RuntimeError as error:
-                row.failure = str(error)
-        _race(fleet, [row for row in rows if not row.failure], problem, rounds, seconds, say)
-    fleet.drop()
-    return rows
+class Truth:
+    """Where NumPy in float64 puts the centers of mass (N, 3) after some steps.
+
+    Args:
+        problem: The population.
+        steps: After how many steps.
+    """
+
+    def __init__(self, problem: Problem, steps: int) -> None:
+        self.problem, self.steps = problem, steps
+        self.free = dataclasses.replace(problem, ground_stiffness=0.0, keep=1.0)
+
+    @functools.cached_property
+    def in_scene(self) -> np.ndarray:
+        """In the scene that is timed."""
+        return _centers(self.problem, self.steps)
+
+    @functools.cached_property
+    def in_flight(self) -> np.ndarray:
+        """Without ground and damping, where the programs with other physics agree too."""
+        return _centers(self.free, self.steps)
 
 
 def _centers(problem: Problem, steps: int) -> np.ndarray:
     program = NumPy(problem, "float64", 1)
     program.run(steps)
     return problem.center_of_mass(program.positions())
+
+
+def compare(
+    fleet: Fleet,
+    truth: Truth,
+    precision: str,
+    rounds: int,
+    seconds: float,
+    say: Callable[[str], None],
+) -> list[Row]:
+    """A row for each program: checked against the truth, then timed for ``seconds`` a round."""
+    rows = [Row(p, precision) for p in fleet.programs if precision in p.precisions]
+    with tempfile.TemporaryDirectory() as folder:
+        scene, flying = Path(folder, "scene.npz"), Path(folder, "free.npz")
+        truth.problem.save(scene)
+        truth.free.save(flying)
+        for row in rows:
+            say(f"checking {row.program.name} on {row.program.threads}")
+            try:
+                if row.program.differs:
+                    _check(fleet, row, flying, truth.in_flight, truth.steps)
+                _check(fleet, row, scene, truth.in_scene, truth.steps)
+                _time(fleet, row, 0.1)  # warm, at the pace without the first calls
+            except RuntimeError as error:
+                row.failure = str(error)
+        _race(fleet, [row for row in rows if not row.failure], truth.problem, rounds, seconds, say)
+    fleet.drop()
+    return rows
 
 
 def _check(fleet: Fleet, row: Row, scene: Path, truth: np.ndarray, steps: int) -> None:

@@ -12,7 +12,7 @@ from peers.fleet import Fleet, cores
 from peers.measure import ALLOWED, FEATURES, Row
 from warp_springs.bench.machine import processor
 
-__all__ = ["as_json", "tables", "write"]
+__all__ = ["as_json", "say_targets", "tables", "write"]
 
 OURS = "warp_springs"
 
@@ -112,13 +112,72 @@ def _number(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def write(path: Path, fleet: Fleet, **parts: list[dict]) -> None:
-    """Write the parts to a file; parts of an earlier run on this machine stay."""
+def say_targets(console: Console, lines: list[dict]) -> None:
+    """What is asked of warp_springs, and what these rows of the table give."""
+    table = Table("population", "asked for", "found", "")
+    for body, precision in dict.fromkeys((line["body"], line["precision"]) for line in lines):
+        rows = [row for row in lines if (row["body"], row["precision"]) == (body, precision)]
+        for text, value, least in _targets(rows, precision):
+            if value is not None:
+                met = "[green]met" if value >= least else "[red]missed"
+                table.add_row(f"{body}s, {precision}", text, f"{value:.3g}", met)
+    console.print("\n[bold]targets")
+    console.print(table)
+
+
+def _targets(rows: list[dict], precision: str):
+    """Each target: what is asked for, what was found (None if that was not run), the least."""
+    rates = {(row["program"], row["threads"]): row["rates"] for row in rows if row["rates"]}
+    counts = sorted({threads for _, threads in rates})
+    one, most = counts[0], counts[-1]
+
+    def faster(names: tuple[str, ...], threads: int) -> float | None:
+        """The least median ratio to any of the programs on so many threads, or on fewer."""
+        ratios = []
+        for name in names:
+            has = [count for n, count in rates if n == name and count <= threads]
+            if has and (OURS, threads) in rates:
+                mine, theirs = rates[OURS, threads], rates[name, max(has)]
+                ratios.append(float(np.median(np.divide(mine, theirs))))
+        return min(ratios, default=None)
+
+    if one == 1:
+        yield "0.6 of the limit, one core", faster(("C++ limit",), one), 0.6
+    if one == 1 < most and (OURS, most) in rates:
+        both = np.divide(rates.get((OURS, most)), rates.get((OURS, one)))
+        yield f"{most} cores 1.8 times one", float(np.median(both)), 1.8
+    if precision == "float32" and (OURS, most) in rates:
+        yield f"1.5 G springs/s, {most} cores", float(np.median(rates[OURS, most])) / 1e9, 1.5
+        yield f"40 times Newton, {most} cores", faster(("Newton",), most), 40.0
+    ordinary, expert = (
+        ("NumPy", "Numba", "JAX", "Taichi"),
+        (
+            "Numba lanes",
+            "Taichi lanes",
+            "JAX unrolled",
+        ),
+    )
+    yield f"5 times the fastest as written, {most} cores", faster(ordinary, most), 5.0
+    yield f"1.5 times the best expert, {most} cores", faster(expert, most), 1.5
+
+
+def write(path: Path, fleet: Fleet, **parts: list[dict]) -> dict:
+    """Write the parts to a file and return all it holds.
+
+    Rows of an earlier run on this machine stay where this run has no new ones.
+    """
     known = json.loads(path.read_text()) if path.exists() else {}
     machine = {"processor": processor(), "cores": len(cores()), "system": platform.platform()}
     known = known if known.get("machine") == machine else {}
     versions = known.get("versions", {}) | fleet.versions | {"python": platform.python_version()}
     known |= {"machine": machine, "versions": versions, "failed": fleet.failed}
-    known |= {name: rows for name, rows in parts.items() if rows}
+    for name, rows in parts.items():
+        rows = {_key(row): row for row in [*known.get(name, []), *rows]}
+        known[name] = list(rows.values())
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(known, indent=1) + "\n")
+    return known
+
+
+def _key(row: dict) -> tuple:
+    return tuple(row[k] for k in ("body", "robots", "precision", "program", "threads"))

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from peers import report
 from peers.figure import draw
 from peers.fleet import LIBRARIES, Fleet, cores
-from peers.measure import FEATURES, compare
+from peers.measure import CHECKED_STEPS, FEATURES, Truth, compare
 from peers.populations import BODIES, population
 from warp_springs.bench.machine import processor
 
@@ -46,12 +46,13 @@ def main() -> None:
             say_who(console, fleet)
             if "table" in args.part:
                 lines = table(console, fleet, args, status.update)
-                report.write(args.json, fleet, table=lines)
+                known = report.write(args.json, fleet, table=lines)
+                report.say_targets(console, known["table"])
             if "sweep" in args.part:
                 lines = sweep(console, fleet, args, status.update)
-                report.write(args.json, fleet, sweep=lines)
+                known = report.write(args.json, fleet, sweep=lines)
                 title = f"Cubes of 28 springs, float32, {processor()}, {len(cores())} cores"
-                draw(lines, f"{title}\n{FEATURES}", args.figure)
+                draw(known["sweep"], f"{title}\n{FEATURES}", args.figure)
                 console.print(f"wrote {args.figure}")
         finally:
             fleet.stop()
@@ -95,8 +96,9 @@ def table(console: Console, fleet: Fleet, args, say) -> list[dict]:
     lines = []
     for body in args.body:
         problem = population(body, args.robots)
+        truth = Truth(problem, CHECKED_STEPS)
         for precision in args.precision:
-            rows = compare(fleet, problem, precision, 500, args.rounds, args.seconds, say)
+            rows = compare(fleet, truth, precision, args.rounds, args.seconds, say)
             title = f"{args.robots:,} {body}s of {problem.n_springs} springs, {precision}"
             report.tables(console, title, rows)
             lines += report.as_json(rows, body, problem.n_robots, problem.n_springs)
@@ -109,7 +111,7 @@ def sweep(console: Console, fleet: Fleet, args, say) -> list[dict]:
     for robots in args.sizes:
         problem = population("cube", robots)
         rounds, seconds = min(args.rounds, 3), args.seconds / 2
-        rows = compare(fleet, problem, "float32", 200, rounds, seconds, say)
+        rows = compare(fleet, Truth(problem, CHECKED_STEPS), "float32", rounds, seconds, say)
         report.tables(console, f"{robots:,} cubes of 28 springs, float32", rows)
         lines += report.as_json(rows, "cube", robots, problem.n_springs)
     return lines

@@ -112,7 +112,7 @@ def here():
 
 
 def test_a_small_comparison(small_fleet, problem, tmp_path):
-    rows = measure.compare(small_fleet, problem, "float64", 120, 2, 0.01, print)
+    rows = measure.compare(small_fleet, measure.Truth(problem, 120), "float64", 2, 0.01, print)
     assert [row.program.name for row in rows] == ["NumPy", "warp_springs"]
     for row in rows:
         assert not row.failure
@@ -132,7 +132,7 @@ def test_a_small_comparison(small_fleet, problem, tmp_path):
 def test_a_program_that_is_wrong_gets_no_speed(small_fleet, problem, monkeypatch):
     honest = measure._centers
     monkeypatch.setattr(measure, "_centers", lambda *a: np.add(honest(*a), [0, 0, 1e-4]))
-    rows = measure.compare(small_fleet, problem, "float32", 30, 1, 0.01, print)
+    rows = measure.compare(small_fleet, measure.Truth(problem, 30), "float32", 1, 0.01, print)
     for row in rows:
         assert "wrong by 1.0e-04 m" in row.failure
         assert not len(row.rates)
