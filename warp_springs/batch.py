@@ -14,12 +14,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warp_springs.element_packing import (
+    PACKED_ELEMENTS,
+    SHARED_ELEMENTS,
+    element_buffers,
+    element_counts,
+    element_lists,
+    traits_of,
+)
+from warp_springs.elements import NONE
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
+from warp_springs.kernels.traits import PLAIN, Traits
 from warp_springs.method import Method
 from warp_springs.packing import (
-    ALL_FIELDS,
     Strip,
     aligned,
     coefficients,
@@ -56,7 +65,14 @@ PACKED = (
     "quanta",
     "oscillators",
     "states",
+    *PACKED_ELEMENTS,
+    *SHARED_ELEMENTS,
 )
+
+
+#: What robots that one kernel steps have in common: the width of their bundles, whether they
+#: actuate, their layout, their traits.
+Kind = tuple[int, bool, str, Traits]
 
 
 @dataclass(frozen=True)
@@ -143,7 +159,7 @@ class Batch:
         method: Method,
         layout_of: Callable[[int], str] = lambda masses: "lanes",
     ) -> None:
-        refuse_unsupported(robots, scene)
+        refuse_unsupported(robots, scene, method.precision)
         self._scene, self._method, self._layout_of = scene, method, layout_of
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
@@ -157,11 +173,12 @@ class Batch:
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             strips = self._strips(robots)
-            for width, actuated, layout in sorted(strips, reverse=True):  # wide first: alignment
+            for kind in sorted(strips, key=_wide_first):
                 first = len(self)
-                for strip in strips[width, actuated, layout]:
+                width, actuated, layout, traits = kind
+                for strip in strips[kind]:
                     self._pack(strip, width, actuated)
-                features = self._features(width, actuated)
+                features = self._features(width, actuated, traits)
                 self.groups.append(Group(features, first, len(self) - first, layout))
             self._finish()
 
@@ -169,10 +186,10 @@ class Batch:
         """Number of bundles."""
         return sum(map(len, self._tables)) if self._tables else 0
 
-    def _strips(self, robots: Sequence[Robot]) -> dict[tuple[int, bool, str], list[Strip]]:
-        """The robots by width of their bundles, by whether they actuate, layout and topology."""
+    def _strips(self, robots: Sequence[Robot]) -> dict[Kind, list[Strip]]:
+        """The robots by kind, and by topology."""
         width = native_width(self._method.precision)
-        strips: dict[tuple[int, bool, str], list[Strip]] = defaultdict(list)
+        strips: dict[Kind, list[Strip]] = defaultdict(list)
         alone: dict[bool, list[int]] = defaultdict(list)
         gathered: list[Strip] = []
         by_hand: list[int] = []
@@ -181,7 +198,9 @@ class Batch:
                 lanes = self._layout_of(robots[cohort].n_masses) == "lanes"
                 (alone[robots[cohort].is_actuated] if lanes else by_hand).append(cohort)
                 continue
-            layout = self._layout_of(int(cohort.masses[0]))
+            layout, traits = self._layout_of(int(cohort.masses[0])), traits_of(cohort.elements)
+            if traits != PLAIN:
+                layout = "lanes"
             if layout == "flat":  # laid out by its own shape, not by that of the first of many
                 by_hand += cohort.ids.tolist()
                 continue
@@ -190,18 +209,21 @@ class Batch:
                 continue
             for actuated, members in self._alike(cohort):
                 # A robot that would be the only one of its bundle needs no other lanes.
-                if len(members) % width == 1:
+                if len(members) % width == 1 and traits != PLAIN:
+                    strips[1, actuated, "lanes", traits].append(cohort.take(members[-1:]))
+                    members = members[:-1]
+                elif len(members) % width == 1:
                     alone[actuated].append(int(cohort.ids[members[-1]]))
                     members = members[:-1]
                 if len(members):
-                    strips[width, actuated, "lanes"].append(cohort.take(members))
+                    strips[width, actuated, "lanes", traits].append(cohort.take(members))
         for actuated, ids in alone.items():
-            strips[1, actuated, "lanes"].append(Strip.ragged(ids, [robots[i] for i in ids]))
+            strips[1, actuated, "lanes", PLAIN].append(Strip.ragged(ids, [robots[i] for i in ids]))
         if by_hand:
             gathered.append(Strip.ragged(by_hand, [robots[i] for i in by_hand]))
         for cohort in gathered:
             for (actuated, layout), strip in self._gathered(cohort, robots):
-                strips[1, actuated, layout].append(strip)
+                strips[1, actuated, layout, PLAIN].append(strip)
         return strips
 
     def _gathered(
@@ -228,14 +250,20 @@ class Batch:
         for index in range(kinds.shape[1]):
             yield bool(kinds[0, index]), np.flatnonzero(kind.ravel() == index)
 
-    def _features(self, width: int, actuated: bool) -> Features:
+    def _features(self, width: int, actuated: bool, traits: Traits) -> Features:
         scene, ground = self._scene, self._scene.ground
+        obstacles = len(scene.obstacles) + (ground is not None) if scene.obstacles else 0
+        flat = ground is not None and not obstacles  # else it is one of the obstacles
         return Features(
             precision=self._method.precision,
             width=width,
             actuated=actuated,
-            ground=ground is not None,
-            friction=ground.friction if ground and ground.has_friction else "none",
+            ground=flat,
+            friction=ground.friction if flat and ground.has_friction else "none",
+            wind=scene.wind is not None,
+            water=scene.water is not None,
+            obstacles=obstacles,
+            traits=traits,
             damping=scene.damping > 0.0,
             drag=scene.drag > 0.0,
             integrator=self._method.integrator,
@@ -285,6 +313,7 @@ class Batch:
             cast = values.astype(dtype_of(name, method.precision), copy=False)
             invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
+        self._pack_elements(strip, width)
         # A stiffness that vanishes would be divided by.
         vanished = fields["stiffness"].astype(real) == 0.0
         invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
@@ -300,6 +329,16 @@ class Batch:
                 name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)
             )
 
+    def _pack_elements(self, strip: Strip, width: int) -> None:
+        """Append the arrays of the elements of a strip."""
+        if strip.elements is NONE:
+            return
+        for name, values in element_buffers(strip.fields).items():
+            cast = values.astype(dtype_of(name, self._method.precision))
+            self._append(name, lane_major(cast, len(strip.ids), width))
+        for name, values in element_lists(strip.elements).items():
+            self._append(name, values)
+
     def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
         """The rows of the table of bundles for a strip."""
         masses, counts = strip.masses[::width], strip.counts[::width]
@@ -312,11 +351,20 @@ class Batch:
             "partner": ("partners", 0 * counts if strip.shared else counts),
             "pair": ("pairs", 0 * counts),
         }
+        # Each bundle of a strip has as many values of its elements.
+        elements = element_buffers(strip.fields)
+        sizes = {name: values.size // len(strip.ids) for name, values in elements.items()}
+        for name, column in PACKED_ELEMENTS.items():
+            blocks[column] = (name, np.full(len(masses), sizes.get(name, 0) * width))
+        for name, column in SHARED_ELEMENTS.items():
+            blocks[column] = (name, 0 * masses)
         table = {
             column: self._sizes[buffer] + np.cumsum(sizes) - sizes
             for column, (buffer, sizes) in blocks.items()
         }
         table |= {"masses": masses, "springs": counts}
+        for column, count in element_counts(strip.elements).items():
+            table[column] = np.full(len(masses), count)
         leaders = strip.ids[::width]
         table["substeps"] = self.substeps[leaders]
         table["level"] = self.levels[leaders]
@@ -348,18 +396,23 @@ class Batch:
         )
 
 
+def _wide_first(kind: Kind) -> tuple:
+    width, actuated, layout, traits = kind
+    return -width, layout, actuated, traits.name  # wide bundles first: alignment
+
+
 def _cohorts(robots: Sequence[Robot]) -> Iterator[Strip | int]:
-    """Robots of one topology as one strip; a robot that shares its topology with none by index."""
+    """Robots of one topology and structure as one strip; a plain robot that shares them with none
+    by its index.
+    """
     if isinstance(robots, Variants) and len(robots) > 1:
         yield Strip.variants(robots)
         return
-    by_topology: dict[bytes, list[int]] = defaultdict(list)
+    alike: dict[tuple[bytes, bytes], list[int]] = defaultdict(list)
     for index, robot in enumerate(robots):
-        by_topology[robot.topology].append(index)
-    for members in by_topology.values():
-        if len(members) == 1:
+        alike[robot.topology, robot.elements.structure].append(index)
+    for members in alike.values():
+        if len(members) == 1 and robots[members[0]].elements is NONE:
             yield members[0]
-            continue
-        chosen = [robots[i] for i in members]
-        fields = {name: np.stack([getattr(r, name) for r in chosen]) for name in ALL_FIELDS}
-        yield Strip.stacked(np.array(members), chosen[0].springs, fields)
+        else:
+            yield Strip.alike(members, [robots[i] for i in members])

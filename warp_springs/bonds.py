@@ -125,8 +125,7 @@ class Bonds:
     def put(self, positions: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions on the constraints and velocities along them, (..., M, 3) each.
 
-        Raises:
-            ValueError: A mass is at the centre of its circle or sphere: which way is not known.
+        A mass at the centre of its circle or sphere goes some way, always the same.
         """
         if not len(self):
             return positions, velocities
@@ -136,8 +135,10 @@ class Bonds:
         v = np.einsum("kij,...kj->...ki", self.projectors, v)
         round_ = self.radii > 0.0
         length = np.sqrt((arm**2).sum(axis=-1))
-        if (length[..., round_] == 0.0).any():
-            raise ValueError("held_to: a mass is at the centre of its circle or sphere")
+        lost = round_ & (length == 0.0)
+        column = np.argmax(np.abs(self.projectors).sum(axis=1), axis=1)
+        arm = np.where(lost[..., None], self.projectors[np.arange(len(self)), column], arm)
+        length = np.where(lost, np.sqrt((arm**2).sum(axis=-1)), length)
         unit = arm / np.where(round_, length, 1.0)[..., None]
         arm = np.where(round_[:, None], unit * self.radii[:, None], arm)
         radial = (v * unit).sum(axis=-1, keepdims=True) * unit

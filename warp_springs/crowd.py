@@ -12,7 +12,7 @@ import itertools
 import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 
 import numpy as np
 import warp as wp
@@ -86,7 +86,8 @@ class Crowd:
         rows = batch.bundles[first:last]
         about = dict(zip(BUNDLE, rows[0], strict=True))
         self._division = int(about["division"])
-        lanes = {k: v for k, v in asdict(group.features).items() if k != "width"}
+        names = [field.name for field in fields(group.features) if field.name != "width"]
+        lanes = {name: getattr(group.features, name) for name in names}
         width = slice_width(self.layout, group.features.precision)
         self.features = GatherFeatures(width=width, layout=self.layout, **lanes)
         self._lists = Lists.of(

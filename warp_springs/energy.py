@@ -19,13 +19,14 @@ class Energy:
 
     Attributes:
         kinetic: sum of m v^2 / 2, with velocities synchronised with the positions.
-        gravity: -sum of m g . x, zero at the origin.
+        gravity: -sum of m g . x, zero at the origin; in water less what lifts, zero above it.
         spring: sum of k (L - L0(t))^2 / 2.
-        ground: sum of K_G z^2 / 2 over the masses below z = 0.
+        ground: sum of K_G z^2 / 2 over the masses below z = 0; of K d^2 / 2 in obstacles.
         work: Work of the breathing springs, the integral of -sum of k (L - L0) dL0/dt.
         damping_loss: Loss to the damping rate.
-        drag_loss: Loss to drag.
-        friction_loss: Loss to friction on the ground.
+        drag_loss: Loss to drag; negative where a wind gives more than the drag takes.
+        friction_loss: Loss to friction on the ground and on obstacles.
+        outer_work: Work of forces from outside: pushes and soft constraints.
     """
 
     kinetic: np.ndarray
@@ -36,6 +37,7 @@ class Energy:
     damping_loss: np.ndarray
     drag_loss: np.ndarray
     friction_loss: np.ndarray
+    outer_work: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
@@ -52,16 +54,18 @@ class Energy:
     def residual(self) -> np.ndarray:
         """Change of the total since the first frame, less the work, plus the losses, (N, F)."""
         with np.errstate(invalid="ignore"):
-            return self.total - self.total[:, :1] - self.work + self.losses
+            return self.total - self.total[:, :1] - self.work - self.outer_work + self.losses
 
     @property
     def gain(self) -> np.ndarray:
         """Energy from nowhere so far, as a part of the energy that came from somewhere, (N, F).
 
         The residual over what the robot held at the first frame (without its height), the height
-        it lost since, and the work of its springs. 0.1 is a coarse step, 1 an explosion.
+        it lost since, and the work of its springs, of pushes and of the wind. 0.1 is a coarse
+        step, 1 an explosion.
         """
         held = self.kinetic[:, :1] + self.spring[:, :1] + self.ground[:, :1]
         fall = self.gravity[:, :1] - np.minimum.accumulate(self.gravity, axis=1)
-        given = held + fall + np.maximum.accumulate(np.abs(self.work), axis=1)
+        works = np.abs(self.work) + np.abs(self.outer_work) + np.maximum(-self.drag_loss, 0.0)
+        given = held + fall + np.maximum.accumulate(works, axis=1)
         return np.maximum(self.residual, 0.0) / np.maximum(given, np.finfo(float).tiny)

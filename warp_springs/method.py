@@ -71,7 +71,7 @@ class Method:
         A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
         oscillation, sqrt(K_G / m) times a drift, below a sixteenth of a radian a sub-step.
         """
-        if scene.ground is None or self.integrator == "euler":
+        if not scene.stiffest_surface or self.integrator == "euler":
             return np.ones(len(strip.ids), np.int64)
         if self.contact_substeps is not None:
             return np.full(len(strip.ids), self.contact_substeps, np.int64)
@@ -79,14 +79,14 @@ class Method:
         return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
 
     def _contact_phase(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
-        """sqrt(K_G / m) of the lightest mass times a drift, shape (n,)."""
+        """sqrt(K / m) of the stiffest surface and the lightest mass times a drift, shape (n,)."""
         lightest = largest(1.0 / strip.fields["masses"], strip.masses)
-        return np.sqrt(scene.ground.stiffness * lightest) * self.spans(levels)
+        return np.sqrt(scene.stiffest_surface * lightest) * self.spans(levels)
 
     def _refused(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
         """Robots that these steps cannot simulate, shape (n,) bool."""
         refused = certainly_unstable(strip, self.dt / 2.0**levels, self.integrator)
-        if scene.ground is None:
+        if not scene.stiffest_surface:
             return refused
         phase = self._contact_phase(strip, scene, levels) / self.substeps(strip, scene, levels)
         chosen = self.integrator != "euler" and self.contact_substeps is None

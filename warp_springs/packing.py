@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warp_springs.element_packing import element_fields
+from warp_springs.elements import NONE, Elements
 from warp_springs.robot import Robot
 from warp_springs.variants import Variants
 
@@ -43,6 +45,7 @@ class Strip:
             or, where they share one topology, of one of them (S, 2).
         shared: Whether all robots share that topology.
         fields: Flat arrays over all masses or all springs, and ``omega`` (n,).
+        elements: Elements whose structure all robots share; their values are in ``fields``.
     """
 
     ids: np.ndarray
@@ -51,19 +54,36 @@ class Strip:
     springs: np.ndarray
     shared: bool
     fields: dict[str, np.ndarray]
+    elements: Elements = NONE
 
     @classmethod
-    def stacked(cls, ids: np.ndarray, springs: np.ndarray, fields: dict[str, np.ndarray]) -> Strip:
-        """Robots of one topology, from arrays with axis 0 the robot."""
+    def stacked(
+        cls,
+        ids: np.ndarray,
+        springs: np.ndarray,
+        fields: dict[str, np.ndarray],
+        elements: Elements = NONE,
+    ) -> Strip:
+        """Robots of one topology and structure, from arrays with axis 0 the robot."""
         n, masses = fields["masses"].shape
         flat = {name: values.reshape(-1, *values.shape[2:]) for name, values in fields.items()}
-        return cls(ids, np.full(n, masses), np.full(n, len(springs)), springs, True, flat)
+        counts = np.full(n, masses), np.full(n, len(springs))
+        return cls(ids, *counts, springs, True, flat, elements)
 
     @classmethod
     def variants(cls, robots: Variants) -> Strip:
         """All variants of one body."""
         fields = {name: robots.array(name) for name in ALL_FIELDS}
-        return cls.stacked(np.arange(len(robots)), robots.body.springs, fields)
+        fields |= element_fields(robots, fields)
+        body = robots[0]  # whose elements have the structure of all
+        return cls.stacked(np.arange(len(robots)), body.springs, fields, body.elements)
+
+    @classmethod
+    def alike(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
+        """Robots of one topology and structure, from a list."""
+        fields = {name: np.stack([getattr(r, name) for r in robots]) for name in ALL_FIELDS}
+        fields |= element_fields(robots, fields)
+        return cls.stacked(np.asarray(ids), robots[0].springs, fields, robots[0].elements)
 
     @classmethod
     def ragged(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
@@ -85,7 +105,8 @@ class Strip:
             name: values.reshape(n, -1, *values.shape[1:])[members].reshape(-1, *values.shape[1:])
             for name, values in self.fields.items()
         }
-        return Strip(self.ids[members], masses, counts, self.springs, True, fields)
+        ids = self.ids[members]
+        return Strip(ids, masses, counts, self.springs, True, fields, self.elements)
 
     @property
     def all_springs(self) -> np.ndarray:

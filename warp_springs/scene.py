@@ -104,6 +104,10 @@ class Water:
         check_number("Water.drag", self.drag, at_least=0.0)
         check_number("Water.layer", self.layer, above=0.0)
 
+    def stiffness(self, gravity: tuple[float, float, float]) -> float:
+        """Of the buoyancy at the surface, for each kg of a mass [1/s^2]."""
+        return abs(self.density * gravity[2]) / self.layer
+
 
 @dataclass(frozen=True)
 class Collisions:
@@ -176,6 +180,21 @@ class Scene:
         check_number("Scene.drag", self.drag, at_least=0.0)
         self._check_surroundings()
 
+    @property
+    def stiffest_surface(self) -> float:
+        """Stiffness of the stiffest of the ground and the obstacles [N/m]; 0 without any."""
+        return max(self._surface_stiffness, default=0.0)
+
+    @property
+    def _surface_stiffness(self) -> list[float]:
+        ground = () if self.ground is None else (self.ground,)
+        return [surface.stiffness for surface in (*ground, *self.obstacles)]
+
+    @property
+    def corner_stiffness(self) -> float:
+        """Of the stiffest corner that surfaces may form: the three stiffest together [N/m]."""
+        return sum(sorted(self._surface_stiffness)[-3:])
+
     def _check_surroundings(self) -> None:
         if self.wind is not None:
             wind = require_vector("Scene.wind", self.wind)
@@ -188,6 +207,11 @@ class Scene:
                 raise TypeError(f"Scene.{name}: got {value!r}, expected a {kind.__name__} or None")
         given = (self.obstacles,) if isinstance(self.obstacles, OBSTACLES) else self.obstacles
         object.__setattr__(self, "obstacles", tuple(given))
+        if self.obstacles and self.ground is not None and self.ground.friction == "course":
+            raise ValueError(
+                "Ground.friction: the classroom's rule is for a flat ground alone; with obstacles "
+                "use 'coulomb'"
+            )
         for index, obstacle in enumerate(self.obstacles):
             if not isinstance(obstacle, OBSTACLES):
                 raise TypeError(

@@ -13,8 +13,9 @@ import numpy as np
 from warp_springs.batch import Batch
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
-from warp_springs.kernels.buffers import dtype_of
+from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of
 from warp_springs.kernels.law import EVALUATIONS
+from warp_springs.kernels.obstacles import obstacle_tables
 from warp_springs.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.method import AUTO_DT, Method
 from warp_springs.packing import aligned
@@ -23,6 +24,7 @@ from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.slices import Tape, cut, run_all
 from warp_springs.stability import Limits, Status
+from warp_springs.support import needs_lanes
 from warp_springs.variants import Variants
 
 __all__ = ["Simulation"]
@@ -94,6 +96,10 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
+        needs = needs_lanes(self.robots, self.scene)
+        if needs and (layout not in ("auto", "lanes") or not place.is_cpu):
+            raise NotImplementedError(f"{needs}: for the layout 'lanes' on a CPU so far")
+        layout = "lanes" if needs else layout
         check_layout(layout, place, precision, [robot.n_masses for robot in _bodies(self.robots)])
         self.dt, self.device, self.layout = AUTO_DT if auto else float(dt), place.alias, layout
         self.precision, self.integrator = precision, integrator
@@ -171,14 +177,17 @@ class Simulation:
     def _allocate(self) -> dict[str, np.ndarray]:
         """Every buffer of the kernels by name: the packed ones, and what is written."""
         batch = self._batch
+        obstacles, heights = obstacle_tables(self.scene)
         buffers = batch.arrays | {
             "bundles": batch.bundles.ravel(),
             "constants": self._method.constants(self.scene).ravel(),
+            "obstacles": obstacles,
+            "heights": heights,
         }
         for name in ("positions", "velocities", "low_positions", "low_velocities"):
             buffers[f"good_{name}"] = self._buffer(f"good_{name}", buffers[name])
         places, lanes = np.zeros(len(buffers["positions"])), len(buffers["omegas"])
-        sizes = {"seen_centers": 3, "seen_energies": 8, "ledgers": 8}
+        sizes = {"seen_centers": 3, "seen_energies": ENERGIES, "ledgers": 2 * len(ACCOUNTS)}
         sizes |= dict.fromkeys(("seen_states", "state_times", "seen_state_times"), 1)
         for name in ("seen_positions", "seen_velocities"):
             buffers[name] = self._buffer(name, places)
@@ -263,7 +272,7 @@ def _energy(tapes: Sequence[Tape], robots: int) -> Energy | None:
     """Energies of all robots, collected from the slices."""
     if not tapes[0].energy:
         return None
-    table = np.zeros((8, robots, len(tapes[0].frame_steps)))
+    table = np.zeros((ENERGIES, robots, len(tapes[0].frame_steps)))
     for tape in tapes:
         table[:, tape.members] = tape.energies.transpose(2, 1, 0)
     table[4:] -= table[4:, :, :1]  # the accounts are opened with the first frame

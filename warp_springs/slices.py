@@ -12,7 +12,7 @@ import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.crowd import Crowd, crowds
-from warp_springs.kernels.buffers import BUNDLE, real_dtype, structs
+from warp_springs.kernels.buffers import BUNDLE, ENERGIES, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 from warp_springs.packing import aligned
 
@@ -122,7 +122,7 @@ class Tape:
         members: Robots of the slice, shape (n,).
         recorded: Those whose frames are kept.
         frames: Their positions [m], flat, shape (F, 3 * sum of M).
-        energies: Energies and ledger [J] of the members, shape (F, n, 8), if they are asked for.
+        energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
         done: Steps done so far.
     """
 
@@ -146,8 +146,8 @@ class Tape:
         self.recorded = inside(self.recorded)
         self._state = self.slots.state_indices(self.recorded)
         self.frames = np.empty((count, len(self._state)))
-        self._lanes = self.slots.lane_indices(self.members, 8)
-        self.energies = np.empty((count if self.energy else 0, len(self.members), 8))
+        self._lanes = self.slots.lane_indices(self.members, ENERGIES)
+        self.energies = np.empty((count if self.energy else 0, len(self.members), ENERGIES))
         bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
         self._which = None if self.energy else _on_device(bundles)
 

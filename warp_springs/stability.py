@@ -111,9 +111,11 @@ def stable_dt(
 def stable_step(strip: Strip, scene: Scene, integrator: str) -> np.ndarray:
     """``stable_dt`` for the robots of a strip, shape (n,)."""
     springs = _largest_frequency(strip)
-    if scene.ground is None:
+    if scene.water is not None:
+        springs = np.hypot(springs, np.sqrt(scene.water.stiffness(scene.gravity)))
+    if not scene.stiffest_surface:
         return _limit(np.zeros_like(springs), integrator) / _positive(springs)
-    ground = np.sqrt(scene.ground.stiffness * largest(1.0 / strip.fields["masses"], strip.masses))
+    ground = np.sqrt(scene.corner_stiffness * largest(1.0 / strip.fields["masses"], strip.masses))
     both = np.hypot(springs, ground)
     share = np.arctan2(ground, springs)
     return _limit(share, integrator) / _positive(both)

@@ -1,22 +1,44 @@
-"""Which elements the kernels can simulate; others are refused instead of being left out."""
+"""What the layouts and precisions can simulate; the rest is refused instead of being left out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from warp_springs.elements import NONE
+from warp_springs.elements import NONE, Elements
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.variants import Variants
 
-__all__ = ["refuse_unsupported"]
+__all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
+
+UNKNOWN = ("harmonics", "omegas", "cubic", "slope", "hinges", "dashpot", "breaks", "yields")
 
 
-def refuse_unsupported(robots: Sequence[Robot], scene: Scene) -> None:
-    """Raise NotImplementedError for an element that the kernels do not know."""
-    for name in ("wind", "water", "obstacles", "collisions"):
-        if getattr(scene, name):
-            raise NotImplementedError(f"Scene.{name} cannot be simulated yet")
-    for robot in [robots.body] if isinstance(robots, Variants) else robots:
-        if robot.elements is not NONE:
-            raise NotImplementedError(f"{robot.elements!r} cannot be simulated yet")
+def elements_of(robots: Sequence[Robot]) -> list[Elements]:
+    """The elements of robots, each structure once or more."""
+    some = robots[:1] if isinstance(robots, Variants) else robots
+    return [robot.elements for robot in some if robot.elements is not NONE]
+
+
+def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
+    """What only the layout "lanes" can do here, in words; empty if nothing."""
+    if scene.obstacles:
+        return "Scene.obstacles"
+    return next(map(repr, elements_of(robots)), "")
+
+
+def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:
+    """Raise NotImplementedError for what the kernels cannot simulate."""
+    if scene.collisions is not None:
+        raise NotImplementedError("Scene.collisions cannot be simulated yet")
+    placed = bool(scene.obstacles)
+    for elements in elements_of(robots):
+        for name in (*UNKNOWN, "timetable"):
+            if getattr(elements, name) is not None:
+                raise NotImplementedError(f"Elements.{name} cannot be simulated yet")
+        placed |= len(elements.bonds) > 0 or len(elements.tethers) > 0
+    if placed and precision == "mixed":
+        raise NotImplementedError(
+            "precision: 'mixed' counts positions from a moving origin, and knows no obstacles, "
+            "constraints or tethers; use 'float64' or 'float32'"
+        )

@@ -8,7 +8,9 @@ import numpy as np
 import warp as wp
 
 __all__ = [
+    "ACCOUNTS",
     "BUNDLE",
+    "ENERGIES",
     "MODEL",
     "REAL",
     "SEEN",
@@ -41,18 +43,37 @@ BUNDLE = (
     "substeps",  # of the contact flow
     "division",  # steps of this bundle in one step of the run
     "level",  # its row of the constants
+    "outer_list",  # the mass of each push and tether: P + T
+    "outer",  # their values: [P + T][5][W]
+    "window",  # when they act: [P + T][2][W]
+    "pushes",  # P
+    "tethers",  # T
+    "skin",  # [M][3][W]
+    "bond",  # [M][10][W]
 )
+
+#: Accounts of the ledger [J]: what a robot was given and lost since it was opened.
+ACCOUNTS = ("work", "damping_loss", "drag_loss", "friction_loss", "outer_work")
+#: How many energies a look finds: kinetic, gravity, spring, ground, and the accounts.
+ENERGIES = 4 + len(ACCOUNTS)
 
 #: What stays as it was packed.
 MODEL = {
     "bundles": np.int64,  # the table of bundles, row by row
     "constants": np.float64,  # a row for each size of step, see kernels.law
+    "obstacles": np.float64,  # records of kernels.obstacles
+    "heights": np.float64,  # of terrain, m
     "rows": np.int32,
     "partners": np.int32,
     "pairs": np.int32,  # see packing.row_pairs
     "inverse_masses": REAL,  # 1/kg
     "coefficients": REAL,  # k, h, or k, ha, hs, hc of each sorted spring: N/m, N
     "omegas": np.float64,  # rad/s
+    "outer_masses": np.int32,
+    "outer_values": REAL,  # force, 0, 0 of a push; point, stiffness, rest length of a tether
+    "outer_windows": np.float64,  # start and end, s
+    "skins": REAL,  # friction and stiffness, see Own in kernels.own
+    "bonds": REAL,  # constraints, likewise
     "reaches2": REAL,  # square of the length that stops a robot, m^2
     "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision
 }
@@ -73,7 +94,7 @@ STATE = {
     "oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt): four a lane
     "states": np.int32,  # Status
     "state_times": np.float64,  # when it was found, s
-    "ledgers": REAL,  # work of actuation, losses to damping, drag, friction, and their good copies
+    "ledgers": REAL,  # the accounts, and their good copies
 }
 
 #: What looking writes.
@@ -81,7 +102,7 @@ SEEN = {
     "seen_positions": WIDE,
     "seen_velocities": WIDE,  # synchronised with the positions
     "seen_centers": WIDE,  # centre of mass: three a lane
-    "seen_energies": REAL,  # kinetic, gravity, spring, ground, and the ledger: eight a lane, J
+    "seen_energies": REAL,  # kinetic, gravity, spring, ground, and the ledger: ENERGIES a lane, J
     "seen_states": np.int32,
     "seen_state_times": np.float64,
 }

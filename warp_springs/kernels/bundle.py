@@ -4,11 +4,14 @@ C++ text for W robots of one topology in the lanes; ``kernels.lanes`` puts it to
 passes that step them.
 """
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
-from warp_springs.kernels.buffers import BUNDLE
+from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES
 from warp_springs.kernels.dialect import vector_dialect
+from warp_springs.kernels.element_text import OWN_OF
 from warp_springs.kernels.law import CONSTANTS, LAW
+from warp_springs.kernels.obstacles import RECORD
+from warp_springs.kernels.traits import PLAIN, Traits
 
 __all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "feature_flags", "preamble"]
 
@@ -29,12 +32,17 @@ class Features:
     damping: bool
     drag: bool
     integrator: str
+    wind: bool = False
+    water: bool = False
+    obstacles: int = 0  # how many, the ground among them
+    traits: Traits = PLAIN
     ledger: bool = False  # whether energies are asked for
 
     @property
     def name(self) -> str:
         """A name for the module, with everything the code depends on."""
-        return "warp_springs_lanes_" + "_".join(str(field).lower() for field in astuple(self))
+        values = [*astuple(replace(self, traits=None)), self.traits.name]
+        return "warp_springs_lanes_" + "_".join(str(value).lower() for value in values)
 
 
 def feature_flags(features: Features) -> str:
@@ -49,8 +57,20 @@ def feature_flags(features: Features) -> str:
         "EULER": features.integrator == "euler",
         "CHIN4": features.integrator == "chin4",
         "LEDGER": features.ledger,
+        "WIND": features.wind,
+        "WATER": features.water,
     }
-    return "\n".join(f"const bool {name} = {str(on).lower()};" for name, on in flags.items()) + "\n"
+    numbers = {
+        "OBSTACLES": features.obstacles,
+        "RECORD": RECORD,
+        "ACCOUNTS": len(ACCOUNTS),
+        "ENERGIES": ENERGIES,
+    }
+    lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
+    lines += [f"const int {name} = {value};" for name, value in numbers.items()]
+    lines += [features.traits.flags]
+    lines += ["double kick_begin = 0, kick_end = 0;  // the time that a kick stands for"]
+    return "\n".join(lines) + "\n"
 
 
 def preamble(features: Features) -> str:
@@ -63,6 +83,8 @@ def preamble(features: Features) -> str:
     lines += ["const double exact_dt = run[0];"]
     lines += [f"const scalar {name} = scalar(run[{i}]);" for i, name in enumerate(CONSTANTS)]
     lines += [f"const int CHECK_EVERY = {CHECK_EVERY};"]
+    lines += ["const double* const obstacles = model.obstacles.data;"]
+    lines += ["const double* const heights = model.heights.data;"]
     dialect = vector_dialect(features.precision, features.width) + feature_flags(features)
     return dialect + "\n".join(lines) + _ORIGIN + LAW + _BUNDLE
 
@@ -80,7 +102,8 @@ look_up_origin();
 """
 
 # What both kernels need: the blocks of one bundle, one row of springs, its health.
-_BUNDLE = r"""
+_BUNDLE = (
+    r"""
 const int M = (int)masses_, S = (int)springs_, substeps = (int)substeps_;
 Vec* const x = (Vec*)(state.positions.data + state_);
 Vec* const v = (Vec*)(state.velocities.data + state_);
@@ -106,15 +129,18 @@ int* const health = state.states.data + lane_;
 double* const health_time = state.state_times.data + lane_;
 Vec* const F = (Vec*)scratch.data;
 Vec* const shifted_x = F + M;
-real* const left_over = (real*)(shifted_x + M);
+real* const left_over = (real*)(shifted_x + M);  // for each surface a mass may touch
 const int K = ACTUATED ? 4 : 2;
 
 auto stiffness = [=](int s) -> real { return p[K * s]; };
 // Accounts of the ledger since it was opened.
-real* const ledger = (real*)(state.ledgers.data + 8 * lane_);
-real* const good_ledger = ledger + 4;
+real* const ledger = (real*)(state.ledgers.data + 2 * ACCOUNTS * lane_);
+real* const good_ledger = ledger + ACCOUNTS;
 real power = zero;
 
+"""
+    + OWN_OF
+    + r"""
 // Half the stiffness times the rest length, at an instant.
 auto half_rest_force = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
@@ -155,6 +181,7 @@ auto diagnose = [=]() -> mask {
         poison += poison_of(a, u);
         fast |= too_fast(u, a - good_x[i]);
         if (GROUND) deep |= in_world(sum_of(x, low_x, i)).z < -depth_limit;
+        if (OBSTACLES) deep |= depth_in_obstacles(a) > zero + depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
             stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
@@ -173,6 +200,7 @@ auto stopped_lanes = [=]() -> mask {
 };
 auto all_stopped = [=]() -> bool { return !any(~stopped_lanes()); };
 """
+)
 
 CONTROL = r"""
 #if MIXED
@@ -228,7 +256,7 @@ auto check = [&](long long n) {
             restore_vec(low_v[i], good_low_v[i]);
         }
     }
-    for (int e = 0; LEDGER && e < 4; ++e) restore(ledger[e], good_ledger[e]);
+    for (int e = 0; LEDGER && e < ACCOUNTS; ++e) restore(ledger[e], good_ledger[e]);
     follow();
 };
 auto set_oscillators = [&](long long n) {
@@ -266,11 +294,16 @@ for (long long n = (long long)first_step * division_; n < past; ++n) {
     }
     const bool start = n == 0;
     const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
+    const double now = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+    kick_begin = EULER || start ? now : now - part;
+    kick_end = EULER ? now + exact_dt : now + part;
     if (EULER) euler();
     else kick_and_drift(false, time, start, !CHIN4);
     if (LEDGER) enter_work(time);
     turn_oscillators();
     if (CHIN4) {
+        kick_begin = kick_end;
+        kick_end = now + exact_dt - part;
         gradient_shift();
         if (LEDGER) enter_work(GRADIENT_KICK);
         kick_and_drift(true, GRADIENT_KICK, false, true);
@@ -285,7 +318,7 @@ OBSERVE = r"""
 wide* const seen_x = (wide*)(seen.seen_positions.data + state_);
 wide* const seen_v = (wide*)(seen.seen_velocities.data + state_);
 wide* const com = (wide*)(seen.seen_centers.data + 3 * lane_);
-real* const energy = (real*)(seen.seen_energies.data + 8 * lane_);
+real* const energy = (real*)(seen.seen_energies.data + ENERGIES * lane_);
 
 const mask before = stopped_lanes();
 const mask reason = diagnose() & ~before;
@@ -319,15 +352,18 @@ auto show = [=](wide* out, Vec a, const double*) { out[0] = a.x; out[1] = a.y; o
 real kinetic = zero, gravity = zero, springs = zero, ground = zero;
 wide total_mass = {}, center[3] = {};
 Vec* const seen_here = shifted_x;
-real accounts[4];
-for (int e = 0; LEDGER && e < 4; ++e) accounts[e] = ledger[e];
+real accounts[ACCOUNTS];
+for (int e = 0; LEDGER && e < ACCOUNTS; ++e) accounts[e] = ledger[e];
 for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
+kick_end = now;
+kick_begin = now - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+if (OUTER) gather_outer(x);
 for (int i = 0; i < M; ++i) {
     const Vec f = row_force(x, i, sine, cosine);
     const Sum here = sum_of(x, low_x, i);
     Sum u = sum_of(v, low_v, i);
     Losses losses = {};
-    if (!EULER && step > 0) synchronise(u, f, w[i], in_world(here).z, losses);
+    if (!EULER && step > 0) synchronise(u, f, in_world(here), w[i], own_of(i), losses);
     enter(ledger, losses, v[i], u, w[i]);
     const Sum a = choose(sum_of(good_x, good_low_x, i), here);
     u = choose(sum_of(good_v, good_low_v, i), u);
@@ -339,7 +375,7 @@ for (int i = 0; i < M; ++i) {
     for (int c = 0; c < 3; ++c) center[c] += widen(m) * seen_x[3 * i + c];
     kinetic += kinetic_energy(u, m);
     gravity += gravity_energy(in_world(a), m);
-    if (GROUND) ground += ground_energy(in_world(a).z);
+    ground += contact_energy(in_world(a), own_of(i));
 }
 for (int c = 0; c < 3; ++c) com[c] = center[c] / total_mass;
 if (LEDGER) {
@@ -353,7 +389,7 @@ if (LEDGER) {
         }
     }
     energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;
-    for (int e = 0; e < 4; ++e) {
+    for (int e = 0; e < ACCOUNTS; ++e) {
         energy[4 + e] = select(stopped, good_ledger[e], ledger[e]);
         ledger[e] = accounts[e];  // looking changes nothing
     }

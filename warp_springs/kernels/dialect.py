@@ -78,6 +78,8 @@ def vector_dialect(precision: str, width: int) -> str:
     auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
     auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
     auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
+    auto lane_of = [](const real& a, int l) -> scalar {{ return a[l]; }};
+    auto set_lane = [](real& a, int l, scalar value) {{ a[l] = value; }};
     auto over_root = [](real h, real a) __attribute__((always_inline)) -> real {{
     #if defined(__AVX512F__) && defined(__AVX512VL__)
         typedef scalar part __attribute__((vector_size(16)));
@@ -121,6 +123,8 @@ def scalar_dialect(precision: str) -> str:
     auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
     auto any = [](mask m) -> bool {{ return m; }};
     auto square_root = [](real a) -> real {{ return {_ROOT[name]}; }};
+    auto lane_of = [](real a, int) -> scalar {{ return a; }};
+    auto set_lane = [](real& a, int, scalar value) {{ a = value; }};
     auto over_root = [](real h, real a) -> real {{
     #if defined(__CUDA_ARCH__)
         {_DEVICE_ROOT[name]}

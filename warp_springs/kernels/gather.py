@@ -167,6 +167,8 @@ def passes(features: GatherFeatures) -> str:
     sizes |= {f"{name.upper()}_COLUMNS": len(table) for name, table in _TABLES.items()}
     lines = [f"const int {name} = {value};" for name, value in sizes.items()]
     lines += [f"const scalar {name} = run.{name};" for name in CONSTANTS]
+    lines += ["const double exact_dt = run.exact_dt;"]
+    lines += ["const double *const obstacles = nullptr, *const heights = nullptr;"]
     if features.vector:
         dialect = vector_dialect(features.precision, features.width)
         loads = quad_operations(features.width) + _vector_loads(features.width)
@@ -251,7 +253,6 @@ auto each_spring = [=](Slot at, const scalar* where, auto work) __attribute__((a
         work(neighbours_of(where + 4 * at.base, j), c[0], c[1], ACTUATED ? c[2] : zero,
              ACTUATED ? c[3] : zero);
 };
-auto lane_of = [](real a, int lane) -> scalar { return a[lane]; };
 """
 
 _SCALAR_LOADS = r"""
@@ -305,7 +306,6 @@ auto each_spring = [=](Slot at, const scalar* where, auto work) {
         c += SLICE * TOGETHER * columns;
     }
 };
-auto lane_of = [](real a, int) -> scalar { return a; };
 """
 
 _PASSES = r"""
@@ -449,8 +449,10 @@ auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v,
     const Sum x_before = a, v_before = v;
     Accounts accounts = open_accounts(state.ledgers.data, at);
     if (LEDGER && ACTUATED && !shifted) accounts.values[0] += sum.power * time;
-    if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values);
-    else move_mass(a, v, sum.f, w, run.substeps, rest, time, start, last, accounts.values);
+    if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values, {});
+    else
+        move_mass(a, v, sum.f, shifted ? from_here(here, a) : in_world(a), w, run.substeps, rest,
+                  time, start, last, accounts.values, {});
     close_accounts(state.ledgers.data, at, accounts);
     const mask is_mass = w > zero;
     v = choose_sum(is_mass, v, v_before);
@@ -468,7 +470,7 @@ auto shift_slot = [=](Slot at, const scalar* now, scalar* then, Vec low, scalar 
         accounts.values[0] += sum.power * GRADIENT_KICK;
         close_accounts(state.ledgers.data, at, accounts);
     }
-    const Vec a = shifted_position(sum_of(&here, &low, 0), sum.f, w);
+    const Vec a = shifted_position(sum_of(&here, &low, 0), sum.f, w, {});
     keep_quad(then, at, choose(w > zero, a, here), w);
 };
 

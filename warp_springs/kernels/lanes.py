@@ -22,6 +22,7 @@ import warp as wp
 from warp_springs.kernels.buffers import real_type, structs
 from warp_springs.kernels.bundle import CONTROL, OBSERVE, STEPS, Features, preamble
 from warp_springs.kernels.strands import strand_passes, strand_scratch
+from warp_springs.kernels.traits import PLAIN
 
 __all__ = ["Features", "Kernels", "kernels", "scratch_size"]
 
@@ -38,8 +39,9 @@ def scratch_size(features: Features, masses: int, springs: int) -> int:
     A force, where the gradient kick of chin4 looks, and the impulse it leaves over for friction,
     for each mass and lane; more where a robot's own springs are the lanes.
     """
-    lanes = 7 * masses * features.width
-    strand = strand_scratch(features.precision, masses, springs) if features.width == 1 else 0
+    outer = 3 if features.traits.outer else 0
+    lanes = (6 + max(1, features.obstacles) + outer) * masses * features.width
+    strand = strand_scratch(features, masses, springs) if features.width == 1 else 0
     return max(lanes, strand)
 
 
@@ -107,24 +109,29 @@ auto enter_work = [&](scalar time) __attribute__((always_inline)) {
 // One kick by the springs, as they pull at x or where the gradient kick looks, and its drift.
 auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
-    sweep(shifted ? shifted_x : x, [&](int i, Vec f) __attribute__((always_inline)) {
+    const Vec* const where = shifted ? shifted_x : x;
+    if (OUTER) gather_outer(where);
+    sweep(where, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
-        real rest = CHIN4 && last ? left_over[i] : zero;
-        move_mass(a, u, f, w[i], substeps, rest, time, start, last, ledger);
-        if (CHIN4 && !last) left_over[i] = rest;
+        real rest = CHIN4 && GROUND && last ? left_over[i] : zero;
+        const Vec at = shifted ? from_here(where[i], a) : in_world(a);
+        move_mass(a, u, f, at, w[i], substeps, rest, time, start, last, ledger, own_of(i));
+        if (CHIN4 && GROUND && !last) left_over[i] = rest;
         keep_sum(x, low_x, i, a);
         keep_sum(v, low_v, i, u);
     });
 };
 auto gradient_shift = [&]() __attribute__((always_inline)) {
+    if (OUTER) gather_outer(x);
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
-        shifted_x[i] = shifted_position(sum_of(x, low_x, i), f, w[i]);
+        shifted_x[i] = shifted_position(sum_of(x, low_x, i), f, w[i], own_of(i));
     });
 };
 auto euler = [&]() __attribute__((always_inline)) {
+    if (OUTER) gather_outer(x);
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
-        move_mass_euler(a, u, f, w[i], ledger);
+        move_mass_euler(a, u, f, w[i], ledger, own_of(i));
         keep_sum(x, low_x, i, a);
         keep_sum(v, low_v, i, u);
     });
@@ -149,7 +156,7 @@ def kernels(features: Features) -> Kernels:
     wp.set_module_options(COMPILER_OPTIONS, module)
 
     # The ledger adds up in the order of the lanes; it is rarely asked for.
-    strand = features.width == 1 and not features.ledger
+    strand = features.width == 1 and not features.ledger and features.traits == PLAIN
     passes = strand_passes(features.precision) + _NO_LEDGER if strand else _PASSES
 
     @wp.func_native(common + CONTROL + passes + STEPS)

@@ -25,6 +25,9 @@ from __future__ import annotations
 
 import math
 
+from warp_springs.kernels.obstacles import MEETING, TOUCHING
+from warp_springs.kernels.own import BINDING, OWN
+
 __all__ = ["CONSTANTS", "DRIFTS", "EVALUATIONS", "LAW", "constants"]
 
 # Host and kernel read the constants of a run from one array, in this order.
@@ -41,6 +44,13 @@ CONSTANTS = (
     "drag",  # c of the drag -c |v| v [kg/m]
     "speed_limit",  # beyond it a robot is stopped [m/s]
     "depth_limit",  # [m]
+    "wind_x",  # velocity of the air [m/s]
+    "wind_y",
+    "wind_z",
+    "water_level",  # [m]
+    "water_layer",  # way over which a mass dives [m]
+    "water_lift",  # acceleration of a mass that is wholly immersed [m/s^2]
+    "water_drag",  # [kg/m]
 )
 
 
@@ -52,6 +62,7 @@ EVALUATIONS = {"euler": 1, "leapfrog": 1, "chin4": 3}
 def constants(scene, dt: float, integrator: str, limits) -> list[float]:
     """Values of ``CONSTANTS`` for a scene, in float64."""
     ground = scene.ground
+    water = scene.water
     span = dt / DRIFTS[integrator]
     return [
         dt,
@@ -64,10 +75,16 @@ def constants(scene, dt: float, integrator: str, limits) -> list[float]:
         scene.drag,
         limits.speed,
         limits.depth,
+        *(scene.wind or (0.0, 0.0, 0.0)),
+        water.level if water else 0.0,
+        water.layer if water else 1.0,
+        -water.density * scene.gravity[2] if water else 0.0,
+        water.drag if water else 0.0,
     ]
 
 
-LAW = r"""
+LAW = (
+    r"""
 struct Vec {
     real x, y, z;
     Vec operator+(const Vec& b) const { return Vec{x + b.x, y + b.y, z + b.z}; }
@@ -101,6 +118,10 @@ auto move_origin = [](real& a, real& low, real by) __attribute__((always_inline)
 auto in_world = [=](const Sum& x) __attribute__((always_inline)) -> Vec {
     return Vec{x.x + origin[0], x.y + origin[1], (x.z + origin[2]) + x.low.z};
 };
+// Where a place near x is that is counted from the same origin.
+auto from_here = [=](Vec place, const Sum& x) __attribute__((always_inline)) -> Vec {
+    return (place - x) + in_world(x);
+};
 #else
 typedef Vec Sum;
 auto sum_of = [](const Vec* a, const Vec*, int i) __attribute__((always_inline)) -> Sum {
@@ -110,6 +131,7 @@ auto keep_sum = [](Vec* a, Vec*, int i, const Sum& sum) __attribute__((always_in
     a[i] = sum;
 };
 auto in_world = [](const Sum& x) __attribute__((always_inline)) -> Vec { return x; };
+auto from_here = [](Vec place, const Sum&) __attribute__((always_inline)) -> Vec { return place; };
 #endif
 // Adds to the horizontal components, or to the vertical one, a rate times a time.
 auto add_level = [=](Sum& sum, Vec rate, scalar time) __attribute__((always_inline)) {
@@ -140,7 +162,11 @@ auto settle_rest = [=](Sum& v) __attribute__((always_inline)) {
 };
 
 // What damping, drag and friction took from a velocity between two drifts.
-struct Losses { Vec damping, drag, friction; };
+struct Losses { Vec damping, drag, friction, outer; mask stuck; };
+"""
+    + OWN
+    + BINDING
+    + r"""
 
 // A spring of stiffness k and rest length L0 pulls its first mass with k (L - L0) d / L
 // = (k - 2 h / L) d, where h = k L0 / 2. TINY keeps 1 / L finite where two masses coincide;
@@ -174,67 +200,77 @@ auto breathing_rate = [=](real hs, real hc, real sine, real cosine, real omega)
 
 // Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
 // square overflows must not come out as rest: it turns into NaN, which the health check sees.
-auto drag_flow = [=](Vec& v, real w, scalar h) __attribute__((always_inline)) {
+auto drag_flow = [=](Vec& v, real w, real ch) __attribute__((always_inline)) {
     real speed2 = v.x * v.x + v.y * v.y + v.z * v.z;
-    real slowing = square_root(speed2) * w * (drag * h) + scalar(1);
+    real slowing = square_root(speed2) * w * ch + scalar(1);
     real factor = (zero + scalar(1)) / slowing + speed2 * scalar(0);
     v.x *= factor; v.y *= factor; v.z *= factor;
 };
 
-// Force of an elastic surface of stiffness k on a mass at height z over it; upward force of the
-// ground.
+// Force of an elastic surface of stiffness k on a mass at height z over it.
 auto surface_force = [=](real z, real k) __attribute__((always_inline)) -> real {
     return select(z < zero, z * -k, zero);
 };
-auto ground_force = [=](real z) __attribute__((always_inline)) -> real {
-    return surface_force(z, zero + ground_stiffness);
+// Upward force of the ground on a mass at height z.
+auto ground_force = [=](real z, const Own& own) __attribute__((always_inline)) -> real {
+    return surface_force(z, contact_stiffness(own, ground_stiffness));
 };
 
 // Coulomb's law for one step: a normal impulse `hold` (per unit of mass) stops a tangential
 // velocity up to mu_s hold, and an impulse j shortens a larger one by mu_k j along its direction.
-auto coulomb = [=](real& ux, real& uy, real hold, real j, scalar kinetic)
-        __attribute__((always_inline)) {
-    if (!any(hold > zero)) return;
-    real speed = square_root(ux * ux + uy * uy);
-    real left = scalar(1) - kinetic * j / select(speed > zero, speed, zero + scalar(1));
+// What is left of it, as a factor:
+auto coulomb = [=](real speed, real hold, real j, real mu_s, real mu_k)
+        __attribute__((always_inline)) -> real {
+    real left = scalar(1) - mu_k * j / select(speed > zero, speed, zero + scalar(1));
     left = select(left > zero, left, zero);
-    real factor = select((hold > zero) & (speed <= static_friction * hold), zero, left);
-    ux *= factor; uy *= factor;
+    return select((hold > zero) & (speed <= mu_s * hold), zero, left);
 };
 
 // The classroom's rule: the horizontal FORCE f against the normal force n. Below mu_s n both the
 // force and the velocity vanish, above it the force is reduced by mu_k n.
-auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n)
+auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n, const Own& own)
         __attribute__((always_inline)) {
     mask touching = n > zero;
     if (!any(touching)) return;
     real f = square_root(fx * fx + fy * fy);
-    mask stuck = touching & (f < static_friction * n);
-    real left = scalar(1) - kinetic_friction * n / select(f > zero, f, zero + scalar(1));
+    mask stuck = touching & (f < static_friction_of(own, static_friction) * n);
+    real left = scalar(1) - kinetic_friction_of(own, kinetic_friction) * n
+        / select(f > zero, f, zero + scalar(1));
     left = select(left > zero, left, zero);
     real factor = select(stuck, zero, select(touching, left, zero + scalar(1)));
     fx *= factor; fy *= factor;
     ux = select(stuck, zero, ux); uy = select(stuck, zero, uy);
 };
 
-// Height z and vertical velocity u under gravity and the ground over one drift, by `substeps`
-// velocity-Verlet steps; returns the impulse of the ground per unit of mass. The kicks that meet
-// between two steps are one: each step waits for the one before, so a step has few operations.
-auto contact_flow = [=](real& z, real& u, real w, int substeps)
+// Height z over a surface of stiffness k and velocity u along its normal, under gravity g along it
+// and the surface's force, over one drift by `substeps` velocity-Verlet steps; returns the impulse
+// of the surface per unit of mass. The kicks that meet between two steps are one: each step waits
+// for the one before, so a step has few operations.
+auto contact_flow = [=](real& z, real& u, real k, real w, real g, int substeps)
         __attribute__((always_inline)) -> real {
-    const scalar h = span / scalar(substeps), fall = gravity_z * h, half = scalar(0.5);
-    const real k = w * (ground_stiffness * h);
-    real push = surface_force(z, k), impulse = push * half;
+    const scalar h = span / scalar(substeps), half = scalar(0.5);
+    const real fall = g * h, strength = w * (k * h);
+    real push = surface_force(z, strength), impulse = push * half;
     u += (push + fall) * half;
     for (int s = 0; s < substeps; ++s) {
         z += u * h;
-        push = surface_force(z, k);
+        push = surface_force(z, strength);
         u = (u + fall) + push;
         impulse += push;
     }
     u -= (push + fall) * half;
     return impulse - push * half;
 };
+// The part of an impulse that may hold a mass in this drift; see touch_down.
+auto share_hold = [=](real& hold, real impulse, real& left_over, bool last)
+        __attribute__((always_inline)) {
+    hold = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
+    left_over = impulse - hold;
+    hold = select(impulse > zero, hold, zero);
+};
+"""
+    + TOUCHING
+    + r"""
 
 // Kicks and drifts. The springs kick; a drift of `span` seconds moves by the velocity, and gravity
 // and the ground's normal force belong to it. Damping and drag act for half a span on either side
@@ -252,9 +288,13 @@ const scalar FIRST_KICK = CHIN4 ? dt / scalar(6) : dt * scalar(0.5);  // half of
 const scalar GRADIENT_KICK = dt * scalar(2) / scalar(3);
 const scalar GRADIENT_SHIFT = dt * dt / scalar(24);
 
-auto kick_acceleration = [=](Vec f, real w) __attribute__((always_inline)) -> Vec {
-    return Vec{f.x * w + gravity_x, f.y * w + gravity_y,
-               GROUND ? f.z * w : f.z * w + gravity_z};
+auto kick_acceleration = [=](Vec f, Vec at, real w, const Own& own)
+        __attribute__((always_inline)) -> Vec {
+    Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, GROUND ? f.z * w : f.z * w + gravity_z};
+    if (OUTER || WATER) a = a + outer_acceleration(at.z, w, own);
+    if (BOUND && GROUND)  // what flies on a great circle takes all forces here
+        a.z += select(is_round(own), ground_force(at.z, own) * w + gravity_z, zero);
+    return BOUND ? tangent(a, at, own) : a;
 };
 auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inline)) {
     if (!DAMPING) return;
@@ -262,41 +302,66 @@ auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inlin
     add(v, before, -part);
     if (LEDGER) losses.damping = losses.damping + (before - v);
 };
-auto slow_down = [=](Vec& v, real w, scalar time, Losses& losses) __attribute__((always_inline)) {
-    if (!DRAG) return;
+// Drag against the air, which the wind moves, and against the water, which is still.
+auto slow_in_air = [=](Vec& v, real w, scalar time) __attribute__((always_inline)) {
+    const Vec wind = {zero + wind_x, zero + wind_y, zero + wind_z};
+    if (WIND) v = v - wind;
+    if (DRAG) drag_flow(v, w, zero + drag * time);
+    if (WIND) v = v + wind;
+};
+auto slow_in_water = [=](Vec& v, real z, real w, scalar time) __attribute__((always_inline)) {
+    if (WATER) drag_flow(v, w, immersed(z) * (water_drag * time));
+};
+auto slow_down = [=](Vec& v, Vec x, real w, scalar time, bool water_first, const Own& own,
+                     Losses& losses) __attribute__((always_inline)) {
+    if (!DRAG && !WATER) return;
     const Vec before = v;
-    drag_flow(v, w, time);
+    if (water_first) slow_in_water(v, x.z, w, time);
+    slow_in_air(v, w, time);
+    if (!water_first) slow_in_water(v, x.z, w, time);
+    if (BOUND && WIND) v = tangent(v, x, own);
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
-auto rub = [=](Sum& v, real hold, real impulse, Losses& losses, scalar kinetic)
+auto rub = [=](Sum& v, real hold, real impulse, const Own& own, Losses& losses, scalar kinetic)
         __attribute__((always_inline)) {
-    if (!COULOMB) return;
+    if (!COULOMB || !any(hold > zero)) return;
     const Vec before = v;
-    coulomb(v.x, v.y, hold, impulse, kinetic);
+    const real factor = coulomb(square_root(v.x * v.x + v.y * v.y), hold, impulse,
+                                static_friction_of(own, static_friction),
+                                kinetic_friction_of(own, kinetic));
+    v.x *= factor; v.y *= factor;
     settle_rest(v);
     if (LEDGER) losses.friction = losses.friction + (before - v);
 };
-// The classroom's friction belongs to the kick, since it works on the force.
-auto kick = [=](Sum& v, Vec f, real w, real z, scalar time, Losses& losses)
+// The classroom's friction belongs to the kick, since it works on the force. The force f was taken
+// at `at`, which is x but for the gradient kick.
+auto kick = [=](Sum& v, Vec f, Vec at, Vec x, real w, scalar time, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
-    Vec a = kick_acceleration(f, w);
+    Vec a = kick_acceleration(f, at, w, own);
+    if (BOUND) a = tangent(a, x, own);
     Sum free = v;
     if (GROUND && COURSE) {
-        course_friction(a.x, a.y, v.x, v.y, ground_force(z) * w);
+        if (LEDGER) add(free, a, time);
+        course_friction(a.x, a.y, v.x, v.y, ground_force(x.z, own) * w, own);
         settle_rest(v);
-        if (LEDGER) add(free, kick_acceleration(f, w), time);
     }
     add(v, a, time);
+    if (LEDGER && OUTER) losses.outer = losses.outer - scaled(own.outer, w * time);
     if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
 };
-auto lose_before = [=](Sum& v, real w, Losses& losses) __attribute__((always_inline)) {
+auto lose_before = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
+        __attribute__((always_inline)) {
     damp(v, loss, losses);
-    slow_down(v, w, span * scalar(0.5), losses);
+    slow_down(v, x, w, span * scalar(0.5), false, own, losses);
 };
-auto lose_after = [=](Sum& v, real w, Losses& losses) __attribute__((always_inline)) {
-    slow_down(v, w, span * scalar(0.5), losses);
+auto lose_after = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
+        __attribute__((always_inline)) {
+    slow_down(v, x, w, span * scalar(0.5), true, own, losses);
     damp(v, loss, losses);
 };
+"""
+    + MEETING
+    + r"""
 
 // A mass in free flight follows its parabola; where the parabola's ends are not both above the
 // ground, the contact flow takes over. Friction acts once a drift, between the kick and the drift,
@@ -304,14 +369,15 @@ auto lose_after = [=](Sum& v, real w, Losses& losses) __attribute__((always_inli
 // impulse. What sticks is held in proportion to the kick before the drift: the first drift of a
 // chin4 step, after a third of the step's kicks, leaves a third of its hold to the second.
 auto touch_down = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
-                      Losses& losses) __attribute__((always_inline)) {
+                      const Own& own, Losses& losses) __attribute__((always_inline)) {
     const real height = in_world(x).z, u = v.z;
     const real mean = u + gravity_z * span * scalar(0.5), z = height + mean * span;
     add_upright(v, zero + gravity_z, span);
     const mask touching = (height < zero) | (z < zero);
     if (any(touching)) {
         real z_contact = height, u_contact = u;
-        real impulse = contact_flow(z_contact, u_contact, w, substeps);
+        real impulse = contact_flow(z_contact, u_contact, contact_stiffness(own, ground_stiffness),
+                                    w, zero + gravity_z, substeps);
         v.z = select(touching, u_contact, v.z);
 #if MIXED
         v.low.z = select(touching, zero, v.low.z);
@@ -321,12 +387,8 @@ auto touch_down = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, boo
 #endif
         impulse = select(touching, impulse, zero);
         real hold = impulse;
-        if (CHIN4) {
-            hold = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
-            left_over = impulse - hold;
-            hold = select(impulse > zero, hold, zero);
-        }
-        rub(v, hold, impulse, losses, kinetic_friction);
+        if (CHIN4) share_hold(hold, impulse, left_over, last);
+        rub(v, hold, impulse, own, losses, kinetic_friction);
     } else {
         if (CHIN4) left_over = zero;
         add_upright(x, mean, span);
@@ -335,9 +397,10 @@ auto touch_down = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, boo
 // Friction slows a sliding mass evenly during the drift, which therefore moves it with the mean of
 // the velocities before and after: second order.
 auto drift = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
-                 Losses& losses) __attribute__((always_inline)) {
+                 const Own& own, Losses& losses) __attribute__((always_inline)) {
+    const Vec x0 = x, v0 = v;
     Vec mean = v;
-    if (GROUND) touch_down(x, v, w, substeps, left_over, last, losses);
+    if (GROUND) touch_down(x, v, w, substeps, left_over, last, own, losses);
     else add_upright(x, v.z, span);
     if (COULOMB) {
         const mask slides = (v.x != zero) | (v.y != zero);
@@ -345,16 +408,21 @@ auto drift = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool las
         mean.y = select(slides, (mean.y + v.y) * scalar(0.5), zero);
     }
     add_level(x, mean, span);
+    if (OBSTACLES) meet_obstacles(x, v, x0, w, substeps, last, own, losses);
+    if (BOUND) bind(x, v, x0, v0, own);
 };
 
 // The velocity at t_n, from the state before its kicks: what the last part of them adds. The state
 // has had its friction up to t_n; here friction only holds what sticks, so that it is reported at
 // rest.
-auto synchronise = [=](Sum& v, Vec f, real w, real z, Losses& losses)
+auto synchronise = [=](Sum& v, Vec f, Vec x, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
-    lose_before(v, w, losses);
-    kick(v, f, w, z, FIRST_KICK, losses);
-    if (GROUND) rub(v, ground_force(z) * w * FIRST_KICK, zero, losses, scalar(0));
+    lose_before(v, x, w, own, losses);
+    kick(v, f, x, x, w, FIRST_KICK, own, losses);
+    if (GROUND)
+        rub(v, ground_force(x.z, own) * w * FIRST_KICK, zero, own, losses, scalar(0));
+    if (OBSTACLES) hold_by_obstacles(x, v, w, FIRST_KICK, own, losses);
+    if (BOUND) restrain(v, tangent(v, x, own));
 };
 
 // Work of a loss that changed the velocity of a mass by -lost while it went from `before` to
@@ -367,70 +435,87 @@ auto loss_work = [=](Vec lost, Vec before, Vec after, real w)
 };
 
 // Symplectic Euler, the classroom's method: all forces at t_n, then velocity, then position.
-auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, Losses& losses)
+auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
-    const real push = GROUND ? ground_force(in_world(x).z) * w : zero;
+    const Vec here = in_world(x);
+    const real push = GROUND ? ground_force(here.z, own) * w : zero;
     Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, f.z * w + gravity_z + push};
+    if (OUTER || WATER) a = a + outer_acceleration(here.z, w, own);
+    if (LEDGER && OUTER) losses.outer = losses.outer - scaled(own.outer, w * dt);
     Sum free = v;
     if (GROUND && COURSE) {
         if (LEDGER) add(free, a, dt);
-        course_friction(a.x, a.y, v.x, v.y, push);
+        course_friction(a.x, a.y, v.x, v.y, push, own);
         settle_rest(v);
     }
     add(v, a, dt);
     if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
-    if (GROUND) rub(v, push * dt, push * dt, losses, kinetic_friction);
+    if (GROUND) rub(v, push * dt, push * dt, own, losses, kinetic_friction);
+    if (OBSTACLES) push_by_obstacles(here, v, w, own, losses);
+    if (BOUND) restrain(v, tangent(v, here, own));
     damp(v, loss * (scalar(2) - loss), losses);
-    slow_down(v, w, dt, losses);
+    slow_down(v, here, w, dt, false, own, losses);
+    const Vec x0 = x, v0 = v;
     add(x, v, dt);
+    if (BOUND) bind(x, v, x0, v0, own);
 };
 
-// The accounts of the ledger [J]: work of the breathing springs, and what damping, drag and
-// friction took from a mass of inverse w.
+// The accounts of the ledger [J], in the order of ``buffers.ACCOUNTS``: work of the breathing
+// springs, what damping, drag and friction took from a mass of inverse w, work from outside.
 auto enter = [=](real* ledger, const Losses& losses, Vec before, Vec after, real w)
         __attribute__((always_inline)) {
     if (!LEDGER) return;
     if (DAMPING) ledger[1] += loss_work(losses.damping, before, after, w);
-    if (DRAG) ledger[2] += loss_work(losses.drag, before, after, w);
-    if (GROUND) ledger[3] += loss_work(losses.friction, before, after, w);
+    if (DRAG || WATER) ledger[2] += loss_work(losses.drag, before, after, w);
+    if (GROUND || OBSTACLES) ledger[3] += loss_work(losses.friction, before, after, w);
+    if (OUTER) ledger[4] -= loss_work(losses.outer, before, after, w);
 };
 // A mass that slides is kicked, then rubbed; one that sticks is both at once, and friction takes
 // back what the kick gave.
 auto enter_step = [=](real* ledger, const Losses& losses, const Losses& rubbed, Vec before,
                       Vec kicked, Vec after, real w) __attribute__((always_inline)) {
     if (!LEDGER) return;
+    if (OBSTACLES) {
+        enter(ledger, losses, before, pick(rubbed.stuck, before, kicked), w);
+        enter(ledger, rubbed, pick(rubbed.stuck, before, kicked), after, w);
+        return;
+    }
     const mask slides = (after.x != zero) | (after.y != zero);
-    auto choose = [=](Vec a, Vec b) -> Vec {
+    auto pick_level = [=](Vec a, Vec b) -> Vec {
         return Vec{select(slides, a.x, b.x), select(slides, a.y, b.y), a.z};
     };
-    enter(ledger, losses, before, choose(kicked, after), w);
-    enter(ledger, rubbed, choose(kicked, before), after, w);
+    const Vec level = {after.x, after.y, kicked.z};
+    enter(ledger, losses, before, pick_level(kicked, level), w);
+    enter(ledger, rubbed, pick_level(kicked, before), level, w);
 };
 
-// One mass moved by its whole force f: a kick of `time` seconds and the drift after it. `start`:
-// nothing came before; `last`: the last drift of the step; `left_over`: see touch_down.
-auto move_mass = [=](Sum& x, Sum& v, Vec f, real w, int substeps, real& left_over, scalar time,
-                     bool start, bool last, real* ledger) __attribute__((always_inline)) {
-    const Vec before = v;
+// One mass moved by its whole force f, taken at `at` in the world: a kick of `time` seconds and the
+// drift after it. `start`: nothing came before; `last`: the last drift of the step; `left_over`:
+// see touch_down.
+auto move_mass = [=](Sum& x, Sum& v, Vec f, Vec at, real w, int substeps, real& left_over,
+                     scalar time, bool start, bool last, real* ledger, const Own& own)
+        __attribute__((always_inline)) {
+    const Vec before = v, here = in_world(x);
     Losses losses = {}, rubbed = {};
-    if (!start) lose_before(v, w, losses);
-    kick(v, f, w, in_world(x).z, time, losses);
-    lose_after(v, w, losses);
+    if (!start) lose_before(v, here, w, own, losses);
+    kick(v, f, at, here, w, time, own, losses);
+    lose_after(v, here, w, own, losses);
     const Vec kicked = v;
-    drift(x, v, w, substeps, left_over, last, rubbed);
-    enter_step(ledger, losses, rubbed, before, kicked, Vec{v.x, v.y, kicked.z}, w);
+    drift(x, v, w, substeps, left_over, last, own, rubbed);
+    enter_step(ledger, losses, rubbed, before, kicked, v, w);
 };
-auto move_mass_euler = [=](Sum& x, Sum& v, Vec f, real w, real* ledger)
+auto move_mass_euler = [=](Sum& x, Sum& v, Vec f, real w, real* ledger, const Own& own)
         __attribute__((always_inline)) {
     const Vec before = v;
     Losses losses = {};
-    euler_step(x, v, f, w, losses);
+    euler_step(x, v, f, w, own, losses);
     enter(ledger, losses, before, v, w);
 };
 // Where the gradient kick of chin4 looks.
-auto shifted_position = [=](Sum x, Vec f, real w) __attribute__((always_inline)) -> Vec {
-    add(x, kick_acceleration(f, w), GRADIENT_SHIFT);
-    return x;
+auto shifted_position = [=](Sum x, Vec f, real w, const Own& own)
+        __attribute__((always_inline)) -> Vec {
+    add(x, kick_acceleration(f, in_world(x), w, own), GRADIENT_SHIFT);
+    return BOUND ? nearest(x, own) : x;
 };
 
 // Health of a mass. Who was shot away and braked since the last check shows by the way it went.
@@ -449,9 +534,12 @@ auto kinetic_energy = [=](Vec v, real m) __attribute__((always_inline)) -> real 
     return m * (v.x * v.x + v.y * v.y + v.z * v.z) * scalar(0.5);
 };
 auto gravity_energy = [=](Vec x, real m) __attribute__((always_inline)) -> real {
-    return -(m * (x.x * gravity_x + x.y * gravity_y + x.z * gravity_z));
+    const real weight = -(m * (x.x * gravity_x + x.y * gravity_y + x.z * gravity_z));
+    return WATER ? weight + buoyancy_energy(x.z, m) : weight;
 };
-auto ground_energy = [=](real z) __attribute__((always_inline)) -> real {
-    return ground_force(z) * z * scalar(-0.5);
+auto contact_energy = [=](Vec x, const Own& own) __attribute__((always_inline)) -> real {
+    if (OBSTACLES) return obstacle_energy(x, own);
+    return GROUND ? ground_force(x.z, own) * x.z * scalar(-0.5) : zero;
 };
 """
+)

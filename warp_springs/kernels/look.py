@@ -55,7 +55,7 @@ const Force sum = gather(at, shown.data, a, sine, cosine);
 Sum v = u;
 Losses losses = {};
 Accounts accounts = open_accounts(stopped ? state.good_ledgers.data : state.ledgers.data, at);
-if (!EULER && step > 0) synchronise(v, sum.f, w, in_world(x).z, losses);
+if (!EULER && step > 0) synchronise(v, sum.f, in_world(x), w, {}, losses);
 if (LEDGER && !stopped) {
     enter(accounts.values, losses, u, v, w);
     if (ACTUATED && !EULER && step > 0) accounts.values[0] += sum.power * FIRST_KICK;
@@ -70,7 +70,7 @@ if (LEDGER)
     });
 const real m = (zero + scalar(1)) / w;
 const real energies[4] = {kinetic_energy(v, m), gravity_energy(in_world(x), m), springs,
-                          GROUND ? ground_energy(in_world(x).z) : zero};
+                          contact_energy(in_world(x), {})};
 Vec parts_of_x[2] = {}, parts_of_v[2] = {};
 keep_sum(parts_of_x, parts_of_x + 1, 0, x);
 keep_sum(parts_of_v, parts_of_v + 1, 0, v);
@@ -135,7 +135,7 @@ for (int e = 0; e < (LEDGER ? LOOKS : 4); ++e)
 for (int axis = 0; axis < 3; ++axis)
     seen.seen_centers.data[3 * lane + axis] = wide_scalar(total[1 + axis] / total[0]);
 for (int e = 0; LEDGER && e < 8; ++e)
-    seen.seen_energies.data[8 * lane + e] = scalar(total[4 + e]);
+    seen.seen_energies.data[ENERGIES * lane + e] = scalar(total[4 + e]);
 const int health = state.states.data[robot];
 seen.seen_states.data[lane] = health ? health : status_of(*flag);
 seen.seen_state_times.data[lane] =

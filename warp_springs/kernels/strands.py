@@ -21,11 +21,12 @@ def strand_width(precision: str) -> int:
     return max(4, native_width(precision))
 
 
-def strand_scratch(precision: str, masses: int, springs: int) -> int:
+def strand_scratch(features, masses: int, springs: int) -> int:
     """Scratch values that the largest robot of a slice needs."""
-    width = strand_width(precision)
+    width = strand_width(features.precision)
     masses, springs = masses + width, springs + 2 * width
-    values = (25 if precision == "mixed" else 17) * masses + 8 * springs
+    state = 24 if features.precision == "mixed" else 16
+    values = (state + max(1, features.obstacles)) * masses + 8 * springs
     indices = 2 * masses + 9 * springs  # no larger than a value each
     return values + indices
 
@@ -72,7 +73,7 @@ quad* const shifted_x = FQ + MP;
 quad* const low_X = shifted_x + MP;  // in mixed precision
 quad* const low_V = low_X + (MIXED ? MP : 0);
 real* const left = (real*)(low_V + (MIXED ? MP : 0));
-quad* const D = (quad*)((scalar*)left + MP);
+quad* const D = (quad*)((scalar*)left + (OBSTACLES ? OBSTACLES : 1) * MP);
 real* const P = (real*)(D + SP + W);
 const int coefficients = ACTUATED ? 4 : 2;
 int* const lower = (int*)(P + coefficients * (SP / W));
@@ -190,17 +191,20 @@ for (int i = 0; i < MP; i += W) {
     const Vec f = load(FQ + i, pad), x_here = load(X + i, iw);
     const Vec low_x_here = MIXED ? load(low_X + i, pad) : Vec{};
     Sum a = sum_of(&x_here, &low_x_here, 0);
+    Own own = {};
+    if (OBSTACLES) own.left_over = left + OBSTACLES * (i / W);
     if (job == 4) {
-        keep(shifted_x + i, shifted_position(a, f, iw), iw);
+        keep(shifted_x + i, shifted_position(a, f, iw, own), iw);
         continue;
     }
     const Vec v_here = load(V + i, pad), low_v_here = MIXED ? load(low_V + i, pad) : Vec{};
     Sum u = sum_of(&v_here, &low_v_here, 0);
-    if (EULER) move_mass_euler(a, u, f, iw, 0);
+    if (EULER) move_mass_euler(a, u, f, iw, 0, own);
     else {
-        real rest = CHIN4 && last ? left[i / W] : zero;
-        move_mass(a, u, f, iw, substeps, rest, time, start, last, 0);
-        if (CHIN4 && !last) left[i / W] = rest;
+        const Vec at_here = job == 5 && WATER ? from_here(load(at + i, pad), a) : in_world(a);
+        real rest = CHIN4 && GROUND && last ? left[i / W] : zero;
+        move_mass(a, u, f, at_here, iw, substeps, rest, time, start, last, 0, own);
+        if (CHIN4 && GROUND && !last) left[i / W] = rest;
     }
     Vec x_then, low_x_then = {}, v_then, low_v_then = {};
     keep_sum(&x_then, &low_x_then, 0, a);

@@ -1,0 +1,55 @@
+"""The elements of a bundle's robots as the lanes see them: C++ text between arrays and law."""
+
+__all__ = ["OWN_OF"]
+
+OWN_OF = r"""
+const int* const outer_mass = model.outer_masses.data + outer_list_;
+const real* const outer_value = (const real*)(model.outer_values.data + outer_);
+const double* const outer_window = model.outer_windows.data + window_;
+const Vec* const skins = (const Vec*)(model.skins.data + skin_);
+const real* const bonds = (const real*)(model.bonds.data + bond_);
+Vec* const outer = (Vec*)(left_over + (OBSTACLES ? OBSTACLES : 1) * M);
+
+// The part of the present kick's time in which a push or a tether acts: so its impulse is exact.
+auto acting = [&](int e) __attribute__((always_inline)) -> real {
+    real part = zero;
+    for (int l = 0; l < W; ++l) {
+        const double start = outer_window[2 * W * e + l], end = outer_window[2 * W * e + W + l];
+        const double from = start > kick_begin ? start : kick_begin;
+        const double to = end < kick_end ? end : kick_end;
+        set_lane(part, l, scalar(to > from ? (to - from) / (kick_end - kick_begin) : 0));
+    }
+    return part;
+};
+// Forces of pushes, and of tethers where the masses are at x.
+auto gather_outer = [&](const Vec* x) {
+    for (int i = 0; i < M; ++i) outer[i] = Vec{zero, zero, zero};
+    for (int e = 0; e < pushes_ + tethers_; ++e) {
+        const real part = acting(e);
+        if (!any(part > zero)) continue;
+        const int i = outer_mass[e];
+        const real* const o = outer_value + 5 * e;
+        Vec f = {o[0], o[1], o[2]};
+        if (e >= pushes_) {
+            const Vec d = f - x[i];
+            f = scaled(d, spring_pull(dot(d, d) + TINY, o[3], o[3] * o[4] * scalar(0.5)));
+        }
+        outer[i] = outer[i] + scaled(f, part);
+    }
+};
+// What mass i has of its own.
+auto own_of = [=](int i) __attribute__((always_inline)) -> Own {
+    Own own = {};
+    if (OBSTACLES) own.left_over = left_over + OBSTACLES * i;
+    if (OUTER) own.outer = outer[i];
+    if (SKIN) own.skin = skins[i];
+    if (BOUND) {
+        const real* const b = bonds + 10 * i;
+        own.diagonal = Vec{b[0], b[1], b[2]};
+        own.corner = Vec{b[3], b[4], b[5]};
+        own.centre = Vec{b[6], b[7], b[8]};
+        own.radius = b[9];
+    }
+    return own;
+};
+"""

@@ -1,0 +1,210 @@
+"""Obstacles: planes, balls, boxes and terrain, as records of numbers and as the law of touch.
+
+A scene with obstacles has its ground among them, as the first plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warp_springs.surfaces import Box, HeightField, Plane, Sphere
+
+__all__ = ["MEETING", "RECORD", "TOUCHING", "obstacle_tables"]
+
+#: Numbers of one obstacle: its kind, stiffness, static and kinetic friction, then its shape.
+RECORD = 20
+_KINDS = {Plane: 0, Sphere: 1, Box: 2, HeightField: 3}
+
+
+def obstacle_tables(scene) -> tuple[np.ndarray, np.ndarray]:
+    """The records of the obstacles of a scene, flat, and the heights of all its terrain [m]."""
+    ground = scene.ground
+    found = list(scene.obstacles)
+    if ground is not None and found:
+        skin = (ground.stiffness, ground.static_friction, ground.kinetic_friction)
+        names = ("stiffness", "static_friction", "kinetic_friction")
+        found.insert(0, Plane(**dict(zip(names, skin, strict=True))))
+    records, heights = np.zeros((len(found), RECORD)), [np.zeros(0)]
+    for record, obstacle in zip(records, found, strict=True):
+        shape = _shape(obstacle, sum(map(len, heights)))
+        record[:4] = (
+            _KINDS[type(obstacle)],
+            obstacle.stiffness,
+            obstacle.static_friction,
+            obstacle.kinetic_friction,
+        )
+        record[4 : 4 + len(shape)] = shape
+        if isinstance(obstacle, HeightField):
+            heights.append(obstacle.heights.ravel())
+    return records.ravel(), np.concatenate(heights)
+
+
+def _shape(obstacle, heights: int) -> tuple[float, ...]:
+    """The numbers of an obstacle's shape; its heights begin at ``heights``."""
+    if isinstance(obstacle, Plane):
+        return (*obstacle.normal, obstacle.offset)
+    if isinstance(obstacle, Sphere):
+        return (*obstacle.center, obstacle.radius)
+    if isinstance(obstacle, Box):
+        half = 0.5 * np.asarray(obstacle.size)
+        return (*obstacle.center, *half, *obstacle.rotation.ravel())
+    return (*obstacle.origin, obstacle.spacing, *obstacle.heights.shape, heights)
+
+
+# Which surface a point touches.
+TOUCHING = r"""
+// The distance of a point from the surface of an obstacle, negative inside, and the normal there.
+struct Touch { real gap; Vec n; };
+
+auto touch_plane = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
+    const Vec n = {zero + scalar(o[4]), zero + scalar(o[5]), zero + scalar(o[6])};
+    return Touch{dot(n, x) - scalar(o[7]), n};
+};
+auto touch_ball = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
+    const Vec d = {x.x - scalar(o[4]), x.y - scalar(o[5]), x.z - scalar(o[6])};
+    const real r = square_root(dot(d, d) + TINY);
+    return Touch{r - scalar(o[7]), scaled(d, (zero + scalar(1)) / r)};
+};
+// Inside, the nearest face pushes; outside, only whether a face separates matters.
+auto touch_box = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
+    const Vec d = {x.x - scalar(o[4]), x.y - scalar(o[5]), x.z - scalar(o[6])};
+    Touch best = {zero, {zero, zero, zero}};
+    for (int axis = 0; axis < 3; ++axis) {
+        const Vec e = {zero + scalar(o[10 + axis]), zero + scalar(o[13 + axis]),
+                       zero + scalar(o[16 + axis])};
+        const real along = dot(e, d);
+        const real gap = select(along < zero, -along, along) - scalar(o[7 + axis]);
+        const mask nearer = axis == 0 ? zero == zero : gap > best.gap;
+        const real sign = select(along < zero, zero - scalar(1), zero + scalar(1));
+        best.gap = select(nearer, gap, best.gap);
+        best.n = pick(nearer, scaled(e, sign), best.n);
+    }
+    return best;
+};
+// Bilinear between four grid points, flat beyond the rim; the distance is that from the tangent.
+auto touch_terrain = [=](const double* o, Vec x) -> Touch {
+    const double spacing = o[7];
+    const int nx = (int)o[8], ny = (int)o[9];
+    const double* const field = heights + (int64_t)o[10];
+    Touch found = {zero, {zero, zero, zero}};
+    for (int l = 0; l < W; ++l) {
+        double u = (lane_of(x.x, l) - o[4]) / spacing, v = (lane_of(x.y, l) - o[5]) / spacing;
+        const bool flat_u = !(u > 0 && u < nx - 1), flat_v = !(v > 0 && v < ny - 1);
+        u = u > 0 ? (u < nx - 1 ? u : nx - 1) : 0;
+        v = v > 0 ? (v < ny - 1 ? v : ny - 1) : 0;
+        const int i = u < nx - 2 ? (int)u : nx - 2, j = v < ny - 2 ? (int)v : ny - 2;
+        u -= i; v -= j;
+        const double* const corner = field + (int64_t)i * ny + j;
+        const double a = corner[0], b = corner[ny], c = corner[1], d = corner[ny + 1];
+        const double z = (a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v;
+        const double zx = flat_u ? 0 : ((b - a) * (1 - v) + (d - c) * v) / spacing;
+        const double zy = flat_v ? 0 : ((c - a) * (1 - u) + (d - b) * u) / spacing;
+        const double steep = 1 / ::sqrt(1 + zx * zx + zy * zy);
+        set_lane(found.gap, l, scalar((lane_of(x.z, l) - o[6] - z) * steep));
+        set_lane(found.n.x, l, scalar(-zx * steep));
+        set_lane(found.n.y, l, scalar(-zy * steep));
+        set_lane(found.n.z, l, scalar(steep));
+    }
+    return found;
+};
+auto touch = [=](const double* o, Vec x) -> Touch {
+    const int kind = (int)o[0];
+    if (kind == 0) return touch_plane(o, x);
+    if (kind == 1) return touch_ball(o, x);
+    return kind == 2 ? touch_box(o, x) : touch_terrain(o, x);
+};
+auto depth_in_obstacles = [=](Vec x) -> real {
+    real deepest = zero;
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const real depth = -touch(obstacles + RECORD * k, x).gap;
+        deepest = select(depth > deepest, depth, deepest);
+    }
+    return deepest;
+};
+auto obstacle_energy = [=](Vec x, const Own& own) -> real {
+    real energy = zero;
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const double* const o = obstacles + RECORD * k;
+        const real gap = touch(o, x).gap, depth = select(gap < zero, gap, zero);
+        energy += contact_stiffness(own, scalar(o[1])) * depth * depth * scalar(0.5);
+    }
+    return energy;
+};
+"""
+
+# What touching does.
+MEETING = r"""
+// Coulomb's law against the tangential velocity u, for a surface with friction of its own.
+auto rub_surface = [=](Vec u, real hold, real impulse, const Own& own, const double* o)
+        __attribute__((always_inline)) -> Vec {
+    const real factor = coulomb(square_root(dot(u, u)), hold, impulse,
+                                       static_friction_of(own, scalar(o[2])),
+                                       kinetic_friction_of(own, scalar(o[3])));
+    return scaled(u, factor);
+};
+
+// A mass that its drift took from `from` to x is stopped and turned by the obstacles it meets.
+// Its kicks are ahead of its drifts, or behind, by `ahead` seconds when a drift begins; along the
+// normal that is undone while gravity and the surface act together, so that a mass at rest stays
+// at rest. `bow` dt^2 is what the stages of a step deviate from a parabola for the same reason.
+auto meet_obstacles = [=](Vec& x, Vec& v, Vec from, real w, int substeps, bool last,
+                          const Own& own, Losses& losses) {
+    const scalar ahead = CHIN4 ? (last ? dt / scalar(3) : dt / scalar(6)) : dt * scalar(0.5);
+    const scalar bow = CHIN4 ? dt * dt / scalar(24) : scalar(0);
+    const Vec gravity = {zero + gravity_x, zero + gravity_y, zero + gravity_z};
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const double* const o = obstacles + RECORD * k;
+        const Touch end = touch(o, x);
+        const mask touching = (end.gap < zero) | (touch(o, from).gap < zero);
+        if (!any(touching)) { if (CHIN4) own.left_over[k] = zero; continue; }
+        const real g = dot(gravity, end.n), speed = dot(v, end.n);
+        real z = end.gap - dot(end.n, x - from), u = speed - g * ahead;
+        if (last) z += g * bow;
+        real impulse = contact_flow(z, u, contact_stiffness(own, scalar(o[1])), w, g, substeps);
+        if (CHIN4 && !last) z -= g * bow;
+        u += g * (ahead - span);
+        impulse = select(touching, impulse, zero);
+        const Vec along = v - scaled(end.n, speed);
+        real hold = impulse;
+        if (CHIN4) share_hold(hold, impulse, own.left_over[k], last);
+        const Vec rubbed = rub_surface(along, hold, impulse, own, o);
+        if (LEDGER) losses.friction = losses.friction + (along - rubbed);
+        const mask stuck = dot(rubbed, rubbed) <= zero;
+        if (LEDGER) losses.stuck |= touching & stuck;
+        const Vec mean = scaled(along + rubbed, select(stuck, zero, zero + scalar(0.5)));
+        const Vec shift = scaled(mean - along, zero + span);
+        x = x + pick(touching, scaled(end.n, z - end.gap) + shift, Vec{zero, zero, zero});
+        v = pick(touching, scaled(end.n, u) + rubbed, v);
+    }
+};
+
+// The same for symplectic Euler, before its drift: forces at x.
+auto push_by_obstacles = [=](Vec x, Vec& v, real w, const Own& own, Losses& losses) {
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const double* const o = obstacles + RECORD * k;
+        const Touch now = touch(o, x);
+        const real depth = select(now.gap < zero, -now.gap, zero);
+        if (!any(depth > zero)) continue;
+        const real impulse = contact_stiffness(own, scalar(o[1])) * depth * w * dt;
+        const real speed = dot(v, now.n);
+        const Vec along = v - scaled(now.n, speed);
+        const Vec rubbed = rub_surface(along, impulse, impulse, own, o);
+        if (LEDGER) losses.friction = losses.friction + (along - rubbed);
+        v = pick(depth > zero, rubbed + scaled(now.n, speed + impulse), v);
+    }
+};
+// A mass that sticks is reported at rest; see synchronise.
+auto hold_by_obstacles = [=](Vec x, Vec& v, real w, scalar time, const Own& own, Losses& losses) {
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const double* const o = obstacles + RECORD * k;
+        const Touch now = touch(o, x);
+        const real depth = select(now.gap < zero, -now.gap, zero);
+        if (!any(depth > zero)) continue;
+        const real impulse = contact_stiffness(own, scalar(o[1])) * depth * w * time;
+        const Vec along = v - scaled(now.n, dot(v, now.n));
+        const Vec rubbed = rub_surface(along, impulse, zero, own, o);
+        if (LEDGER) losses.friction = losses.friction + (along - rubbed);
+        v = pick(depth > zero, v - along + rubbed, v);
+    }
+};
+"""
