@@ -42,15 +42,17 @@ class Studio:
     @cached_property
     def walkers(self) -> tuple[ws.Result, list[str]]:
         """The nine best of the walker preset, moving, and what is written beside them."""
-        from evolve.export import label, trial
+        from evolve.export import trial
         from evolve.run import Run
+        from evolve.show import label
 
-        if not (self.run / "zoo.png").exists():
+        if not (self.run / "learning_curve.png").exists():
             _do("-m", "evolve.cli", "run", "walker", "--out", self.run)
         run = Run.open(self.run)
         with run.read() as store:
             zoo = store.finalists()[:9]
-            return trial(run, store, zoo), [label(member) for member in zoo]
+            motion = trial(run, store, [member.id for member in zoo], energy=True)
+            return motion, [label(member) for member in zoo]
 
     def zoo(self) -> None:
         """The nine best, each in its tile."""
@@ -81,10 +83,7 @@ class Studio:
     def overview(self) -> None:
         """Every plot of the champion's trial."""
         motion, _ = self.walkers
-        champion = motion.robots[0]
-        again = ws.Simulation([champion], motion.scene, dt=motion.dt)
-        result = again.run(float(motion.times[-1]), fps=100, energy=True)
-        ws.plots.overview(result).savefig(self.figures / "overview.png", dpi=90)
+        ws.plots.overview(motion).savefig(self.figures / "overview.png", dpi=90)
 
     # -- of scenes -----------------------------------------------------------------------------
 

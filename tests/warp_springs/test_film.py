@@ -121,7 +121,7 @@ def director(result, **options):
     cut = Cut(**{k: v for k, v in options.items() if k in ("follow", "turns")})
     look = Look(camera=options.get("camera"))
     actors = actors_of(result, [0], look, None, film=True)
-    return actors[0], Director(actors, SIZE, look, cut, result.scene)
+    return actors[0], Director(actors, result.times, SIZE, look, cut, result.scene)
 
 
 @pytest.mark.parametrize("camera", [None, Camera(eye=(2.0, -2.0, 1.0))])

@@ -28,6 +28,7 @@ class Director:
     def __init__(
         self,
         actors: Sequence[Actor],
+        times: FloatArray,
         size: tuple[int, int],
         look: Look,
         cut: Cut,
@@ -39,6 +40,7 @@ class Director:
 
         Args:
             actors: At their places.
+            times: The times that are shown [s], (K,).
             size: Of the picture in pixels.
             look: Its azimuth, elevation and camera are kept where they are given.
             cut: Whether the camera follows and turns.
@@ -50,14 +52,20 @@ class Director:
         way = np.mean([a.calm_way + a.offset for a in actors], axis=0)
         if scene.ground is not None:
             way[:, 2] = 0.0
-        self._way = way if cut.follow else np.tile(way[:1], (len(way), 1))
+        self._way = way
+        if not cut.follow:
+            self._way = np.tile(self.way(times[0]), (len(way), 1))
         view = _VIEW_OF_TILE if tile else _VIEW_OF_ONE if len(actors) == 1 else _VIEW_OF_MANY
         self._view = dict(view)
+        if len(times) > 1:  # room for all its poses is room enough for each
+            self._view["margin"] = 1.0 + 0.4 * (view["margin"] - 1.0)
         if look.azimuth is not None:
             self._view["azimuth"] = look.azimuth
         if look.elevation is not None:
             self._view["elevation"] = look.elevation
-        self._points, self._radius = self._seen_around_the_way(scene)
+        self._start = float(times[0])
+        steps = np.unique(np.linspace(0, len(times) - 1, _SAMPLES).astype(int))
+        self._points, self._radius = self._seen_around_the_way(times[steps], scene)
 
     def way(self, time: float) -> FloatArray:
         """Return the place that the camera follows [m], (3,)."""
@@ -67,7 +75,7 @@ class Director:
         """Return the camera at a time [s], after a share 0 ... 1 of the film."""
         turn = 360.0 * self._turns * share
         if self._look.camera is not None:
-            return _moved(self._look.camera, self.way(time) - self.way(self._times[0]), turn)
+            return _moved(self._look.camera, self.way(time) - self.way(self._start), turn)
         view = {**self._view, "azimuth": self._view["azimuth"] + turn}
         points = _turned(self._points, turn) if self._turns else self._points
         camera = Camera.framing(points, self._size, radius=self._radius, **view)
@@ -77,17 +85,16 @@ class Director:
         """Leave more room around the robots."""
         self._view["margin"] *= factor
 
-    def _seen_around_the_way(self, scene: Scene) -> tuple[FloatArray, float]:
+    def _seen_around_the_way(self, times: FloatArray, scene: Scene) -> tuple[FloatArray, float]:
         """Return what is to be seen, (P, 3) m from what the camera follows, and its margin [m]."""
-        steps = np.unique(np.linspace(0, len(self._times) - 1, _SAMPLES).astype(int))
         points, props = [], []
         for actor in self._actors:
-            around = actor.frames[steps] + actor.offset - self._way[steps, None]
-            points.append(around.reshape(-1, 3))
-            reach = NEAR * actor.body.diameter
-            for k in steps if scene.obstacles else ():
-                corners = corners_near(scene.obstacles, actor.calm_way[k], reach)
-                props.append(corners + actor.offset - self._way[k])
+            reach = NEAR * actor.body.diameter if scene.obstacles else 0.0
+            for time in times:
+                points.append(actor.positions(time) - self.way(time))
+                place = actor.way(time) - actor.offset
+                corners = corners_near(scene.obstacles, place, reach)
+                props.append(corners + actor.offset - self.way(time))
         if sum(map(len, props)):
             self._view["margin"] = min(self._view["margin"], _MARGIN_OF_PROPS)
         points, radius = np.concatenate(points + props), max(a.ball for a in self._actors)

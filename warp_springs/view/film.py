@@ -44,6 +44,7 @@ class Shot:
     def __init__(
         self,
         actors: Sequence[Actor],
+        times: FloatArray,
         scene: Scene,
         look: Look,
         cut: Cut,
@@ -57,6 +58,7 @@ class Shot:
 
         Args:
             actors: The robots; on a grid they are moved.
+            times: The times that will be shown [s], (K,).
             scene: Their world.
             look: How they are drawn.
             cut: How the camera moves.
@@ -68,8 +70,9 @@ class Shot:
         self.actors, self._scene, self._look = actors, scene, look
         self._rasteriser, self._tile = rasteriser, tile
         self._floor = scene.ground is not None
-        self._setting = {"size": rasteriser.size, "look": look, "cut": cut}
+        self._setting = {"times": times, "size": rasteriser.size, "look": look, "cut": cut}
         self._setting |= {"scene": scene, "tile": tile}
+        self._times = times
         letters = max(_SMALLEST_LETTERS, round(rasteriser.size[1] * _LETTERS_PER_HEIGHT))
         letters = max(letters, 14) if tile else letters
         self._images = [texts.text_image(label, letters) for label in labels or ()]
@@ -112,9 +115,9 @@ class Shot:
 
     def _samples(self) -> list[tuple[float, float]]:
         """Times that are looked at beforehand, and their shares of the film."""
-        times = self.actors[0].times
-        chosen = np.unique(np.linspace(0, len(times) - 1, _SAMPLES).astype(int))
-        return [(float(times[i]), i / max(len(times) - 1, 1)) for i in chosen]
+        count = len(self._times)
+        chosen = np.unique(np.linspace(0, count - 1, _SAMPLES).astype(int))
+        return [(float(self._times[i]), i / count) for i in chosen]
 
     def _hang_labels(self) -> None:
         """Find how far below the place of a robot its label must hang to hide none of it."""
@@ -208,10 +211,10 @@ class Film:
         scene = result.scene
         if layout != "panel" or len(actors) == 1:
             grid = layout == "grid" and len(actors) > 1
-            shot = Shot(actors, scene, look, cut, rasteriser, labels=labels, grid=grid)
+            shot = Shot(actors, self.times, scene, look, cut, rasteriser, labels=labels, grid=grid)
             self.shots = [(shot, slice(None), slice(None))]
         else:
-            self.shots = list(_panel(actors, scene, look, cut, rasteriser, labels))
+            self.shots = list(_panel(actors, self.times, scene, look, cut, rasteriser, labels))
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -245,6 +248,7 @@ class Film:
 
 def _panel(
     actors: Sequence[Actor],
+    times: FloatArray,
     scene: Scene,
     look: Look,
     cut: Cut,
@@ -265,7 +269,7 @@ def _panel(
         row, column = divmod(i, columns)
         y, x = top + row * (height + _GUTTER), left + column * (width + _GUTTER)
         words = None if labels is None else [labels[i]]
-        shot = Shot([actor], scene, look, cut, small, labels=words, tile=True)
+        shot = Shot([actor], times, scene, look, cut, small, labels=words, tile=True)
         yield shot, slice(y, y + height), slice(x, x + width)
 
 
