@@ -37,6 +37,7 @@ UNITS = {
     "mass": "kg",
     "mass_per_vertex": "kg",
     "position": "m",
+    "positions": "m",
     "velocity": "m/s",
     "spin": "rad/s",
     "omega": "rad/s",

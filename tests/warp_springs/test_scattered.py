@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from tests.warp_springs.test_shapes import assert_closed
 from warp_springs import shapes
 from warp_springs.shapes.points import pairs_within
 
@@ -44,6 +45,16 @@ def test_springs_join_all_masses_within_reach():
     assert robot.mass == pytest.approx(2.0)
     assert set(robot.stiffness) == {50.0}
     assert np.array_equal(robot.rest_length, robot.lengths)
+
+
+def test_the_skin_is_closed_and_wraps_the_lattice():
+    robot = shapes.random_lattice((0.5, 0.4, 0.3), 0.03, seed=3)
+    assert_closed(robot)
+    assert robot.volume == pytest.approx(0.06, rel=0.15)
+    outer = np.unique(robot.faces)
+    depth = np.minimum(robot.positions, np.array([0.5, 0.4, 0.3]) - robot.positions).min(axis=1)
+    assert depth[outer].max() < 0.03
+    assert len(outer) > 0.8 * (depth < 0.3 * 0.03).sum()
 
 
 @pytest.mark.parametrize("count", [1, 500, 3000])

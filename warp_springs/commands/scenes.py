@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,14 +25,20 @@ def simulated(config: SceneFile, console: Console) -> Result:
         return config.run(advance)
 
 
-def write_and_say(config: SceneFile, result: Result, folder: Path, console: Console) -> list[Path]:
+def write_and_say(
+    config: SceneFile,
+    result: Result,
+    folder: Path,
+    console: Console,
+    findings: Sequence[tuple[str, str]] = (),
+) -> list[Path]:
     """Write the files of a run, print what came of it and where everything is."""
     from warp_springs.outputs import write_outputs
     from warp_springs.parameters import outcome
 
     with console.status("writing"):
-        paths = write_outputs(config, result, folder)
-    print_rows(console, outcome(result))
+        paths = write_outputs(config, result, folder, findings)
+    print_rows(console, [*findings, *outcome(result)])
     print("wrote")
     for path in paths:
         print(f"  {path}")

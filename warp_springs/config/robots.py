@@ -259,6 +259,8 @@ class RobotConfig(Section):
     rotation: RotationConfig | None = None
     position: Triple = (0.0, 0.0, 0.0)
     """Where the origin of the body goes [m]."""
+    positions: tuple[Triple, ...] = ()
+    """Where a copy goes, each [m]; instead of the position and the number of copies."""
     velocity: Triple = (0.0, 0.0, 0.0)
     """[m/s]"""
     spin: Triple = (0.0, 0.0, 0.0)
@@ -269,6 +271,12 @@ class RobotConfig(Section):
     seed: int = Field(0, ge=0)
     """From which the random turns follow."""
 
+    @model_validator(mode="after")
+    def _copies_are_told_once(self) -> RobotConfig:
+        if self.positions and (self.copies > 1 or any(self.position)):
+            raise ValueError("give either positions, or a position and the number of copies")
+        return self
+
     @field_validator("actuation", mode="before")
     @classmethod
     def _one_will_do(cls, value: Any) -> Any:
@@ -277,10 +285,11 @@ class RobotConfig(Section):
     def build(self) -> list[Robot]:
         """Make the robot and its copies."""
         robot = self._assembled()
+        places = self.positions or (self.position,) * self.copies
         if self.orientation == "same":
-            return [self._started(robot)] * self.copies
+            return [self._started(robot, place) for place in places]
         rng = np.random.default_rng(self.seed)
-        return [self._started(_turned(robot, rng)) for _ in range(self.copies)]
+        return [self._started(_turned(robot, rng), place) for place in places]
 
     def _assembled(self) -> Robot:
         """The body with all that goes with it wherever it goes."""
@@ -310,11 +319,11 @@ class RobotConfig(Section):
             robot = robot.shod(entry.rows(robot), **settings)
         return robot
 
-    def _started(self, robot: Robot) -> Robot:
+    def _started(self, robot: Robot, place: Triple) -> Robot:
         """The robot where it starts, and moving as it starts."""
         if self.rotation is not None:
             robot = robot.rotated(self.rotation.axis, self.rotation.angle)
-        robot = robot.moved(self.position)
+        robot = robot.moved(place)
         if any(self.velocity):
             robot = robot.moving(self.velocity)
         if any(self.spin):

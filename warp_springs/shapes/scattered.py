@@ -6,11 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_springs.fields import require_positive, require_whole
-from warp_springs.geometry import FloatArray, spring_lengths
+from warp_springs.geometry import FloatArray, IntArray, spring_lengths
 from warp_springs.robot import Robot
 from warp_springs.shapes.points import pairs_within, scattered_points
+from warp_springs.shapes.surface import without_folds
+from warp_springs.shapes.voxels import lattice
 
 __all__ = ["random_lattice"]
+
+_MOST_CELLS = 2**21
+"""Cells of the grid whose surface becomes the skin; a larger lattice has none."""
 
 
 def random_lattice(
@@ -44,7 +49,8 @@ def random_lattice(
         stiffness: Of every spring [N/m].
 
     Returns:
-        The lattice, without faces; masses ordered by place, springs by (lower, higher) index.
+        The lattice, masses ordered by place, springs by (lower, higher) index. Its faces are those
+        of the box, their corners moved to the nearest mass; none where the box is too thin.
 
     Raises:
         ValueError: A parameter is out of range, or there are fewer pairs than springs asked for.
@@ -65,7 +71,35 @@ def random_lattice(
         positions=points,
         springs=springs,
         stiffness=require_positive("stiffness", stiffness),
+        faces=_skin(points, low, high, spacing),
     )
+
+
+def _skin(points: FloatArray, low: FloatArray, high: FloatArray, spacing: float) -> IntArray:
+    """Triangles over the outermost masses: the surface of a grid moved onto them, still closed."""
+    cells = np.maximum(np.rint((high - low) / spacing).astype(int), 1)
+    if cells.max() < 2 or cells.prod() > _MOST_CELLS:
+        return np.zeros((0, 3), np.int32)
+    grid = lattice(*cells, edge=1.0)
+    corners, faces = np.unique(grid.faces, return_inverse=True)
+    places = low + grid.positions[corners] * ((high - low) / cells)
+    outer = np.flatnonzero((np.minimum(points - low, high - points) < spacing).any(axis=1))
+    nearest = outer[_nearest(places, points[outer])]
+    faces = nearest[faces.reshape(-1, 3)]
+    proper = np.sort(faces, axis=1)
+    faces = faces[(proper[:, 1:] != proper[:, :-1]).all(axis=1)]
+    return without_folds(faces).astype(np.int32)
+
+
+def _nearest(places: FloatArray, points: FloatArray) -> np.ndarray:
+    """The nearest point of each place, (P, 3) and (Q, 3) -> (P,)."""
+    rows = max(1, 2**22 // len(points))
+    squares = (points**2).sum(axis=1)
+    parts = [
+        np.argmin(squares - 2.0 * places[i : i + rows] @ points.T, axis=1)
+        for i in range(0, len(places), rows)
+    ]
+    return np.concatenate(parts)
 
 
 def _closest_pairs(points: FloatArray, count: int, reach: float) -> np.ndarray:

@@ -17,6 +17,7 @@ __all__ = [
     "inside",
     "sphere_surface",
     "vertex_normals",
+    "without_folds",
 ]
 
 IndexArray = NDArray[np.intp]
@@ -95,6 +96,21 @@ def components(n: int, pairs: IndexArray) -> int:
         if np.array_equal(better, label):
             return len(np.unique(label))
         label = better
+
+
+def without_folds(faces: IndexArray) -> IndexArray:
+    """Triangles (T, 3) without those that lie back to back, in pairs, and without repetitions."""
+    start = faces.argmin(axis=1)[:, None] if len(faces) else np.zeros((0, 1), np.intp)
+    cyclic = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1)
+    even = cyclic[:, 1] < cyclic[:, 2]
+    corners = np.where(even[:, None], cyclic, cyclic[:, [0, 2, 1]])
+    _, group = np.unique(corners, axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    turns = np.bincount(group, np.where(even, 1.0, -1.0))
+    sign = np.where(even, 1.0, -1.0)
+    rows = np.flatnonzero(turns[group] * sign > 0.0)
+    _, first = np.unique(group[rows], return_index=True)
+    return faces[rows[np.sort(first)]]
 
 
 def inside(points: FloatArray, positions: FloatArray, faces: IndexArray) -> NDArray[np.bool_]:

@@ -1,0 +1,88 @@
+"""What the demonstrations show, in figures: counted and measured on the run itself."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from warp_springs.config import SceneFile
+    from warp_springs.result import Result
+
+__all__ = ["bounces", "findings", "peak_deceleration"]
+
+Row = tuple[str, str]
+
+GRAVITY = 9.81
+FLIGHT = 0.1
+"""Seconds in the air that make a bounce, not a tumble from corner to corner."""
+FINE_FPS = 2000.0
+"""Frames a second that resolve a blow."""
+
+
+def findings(config: SceneFile, result: Result) -> list[Row]:
+    """What there is to say about a demonstration, a row each."""
+    measured = {
+        "bouncing-cube": _bouncing,
+        "tetrahedron": _bouncing,
+        "breathing-cube": _breathing,
+        "worm": _breathing,
+        "soft-legs": _legs,
+        "ten-cubes": _rest,
+    }
+    return measured[config.name](config, result) if config.name in measured else []
+
+
+def bounces(result: Result, robot: int = 0) -> int:
+    """How often a robot left the ground, after it had touched it, for `FLIGHT` at least."""
+    touching = (result.frames(robot)[:, :, 2] <= 0.0).any(axis=1)
+    contacts = np.flatnonzero(touching)
+    if len(contacts) == 0:
+        return 0
+    flights = np.diff(result.times[contacts], append=result.times[-1])
+    return int((flights >= FLIGHT).sum())
+
+
+def peak_deceleration(config: SceneFile, robot: int) -> float:
+    """Largest upward acceleration [m/s^2] of the upper quarter of a robot, simulated finely."""
+    fine = config.make_simulation().run(1.0, fps=FINE_FPS, record=[robot])
+    start = fine.robots[robot].positions[:, 2]
+    top = start > start.max() - 0.25 * np.ptp(start) - 1e-9
+    height = fine.frames(robot)[:, top, 2].mean(axis=1)
+    return float(np.diff(height, 2).max() * FINE_FPS**2)
+
+
+def _bouncing(config: SceneFile, result: Result) -> list[Row]:
+    return [("bounces", str(bounces(result)))]
+
+
+def _breathing(config: SceneFile, result: Result) -> list[Row]:
+    robot = result.robots[0]
+    cycles = (result.end_time - result.start_time) * abs(robot.omega) / (2.0 * math.pi)
+    way = result.center_of_mass[0] - robot.center_of_mass
+    size = robot.diameter
+    return [
+        ("cycles", f"{cycles:.2f}"),
+        ("way over the ground", f"{1000.0 * math.hypot(*way[:2]):.1f} mm"),
+        ("speed", f"{math.hypot(*way[:2]) / size / cycles:.3g} body diameters a cycle"),
+    ]
+
+
+def _legs(config: SceneFile, result: Result) -> list[Row]:
+    return [
+        (
+            f"{name.rpartition(' ')[0]} from {robot.bounds[0, 2]:.1f} m: largest deceleration",
+            f"{peak_deceleration(config, i) / GRAVITY:.0f} g",
+        )
+        for (i, name), robot in zip(config.names.items(), result.robots, strict=True)
+    ]
+
+
+def _rest(config: SceneFile, result: Result) -> list[Row]:
+    kinetic = result.energy.kinetic[:, -1] if result.energy is not None else np.zeros(1)
+    return [
+        ("kinetic energy left", f"at most {1000.0 * kinetic.max():.2g} mJ"),
+        ("bounces", ", ".join(str(bounces(result, i)) for i in result.recorded)),
+    ]
