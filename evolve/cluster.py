@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from evolve.encodings.base import Genomes
 from evolve.errors import RunError
+from evolve.judge import Ticket
 from evolve.scores import Scores
 from evolve.workshop import Workshop, chunks, cores
 
@@ -53,6 +55,8 @@ class Cluster:
             self.close()
             raise RunError(f"the cluster has {there:g} GPUs, simulation.devices asks for {gpus}")
         self._actors = [self._start(dump(config), device) for device in settings.devices]
+        self._idle, self._busy = deque(self._actors), {}
+        self._waiting: deque[tuple[list[Scores | None], int, list[bytes]]] = deque()
 
     def _start(self, config: str, device: str) -> Any:
         """An actor on a device; Ray chooses the machine, and which of its GPUs the actor sees."""
@@ -62,32 +66,41 @@ class Cluster:
         )
         return worker.remote(config, "cuda:0" if on_gpu else device, 1)
 
-    def __call__(self, genomes: Genomes, blobs: Sequence[bytes]) -> Scores:
-        """Scores of n genomes, by their bytes."""
-        ray, parts = self._ray, chunks(blobs, len(self._actors))
-        waiting, answers = list(enumerate(parts)), {}
-        idle, busy = list(self._actors), {}
-        while len(answers) < len(parts):
-            while waiting and idle:
-                (index, part), actor = waiting.pop(0), idle.pop()
-                busy[actor.judge.remote(part)] = index, actor
-            (done, *_), _ = ray.wait(list(busy))
-            index, actor = busy.pop(done)
-            answers[index] = self._answer(done)
-            idle.append(actor)
-        # Arrays that come out of Ray are read-only; scores are never written to.
-        return Scores.concatenate([answers[i] for i in range(len(parts))])
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """Begin to simulate n genomes, by their bytes; several may be under way at once."""
+        parts = chunks(blobs, len(self._actors))
+        answers: list[Scores | None] = [None] * len(parts)
+        self._waiting.extend((answers, index, part) for index, part in enumerate(parts))
+        self._feed()
+        return lambda: self._finished(answers)
+
+    def _feed(self) -> None:
+        """Give waiting parts to idle actors."""
+        while self._waiting and self._idle:
+            (answers, index, part), actor = self._waiting.popleft(), self._idle.popleft()
+            self._busy[actor.judge.remote(part)] = answers, index, actor
+
+    def _finished(self, answers: list[Scores | None]) -> Scores:
+        while None in answers:
+            self._feed()
+            (done, *_), _ = self._ray.wait(list(self._busy))
+            whose, index, actor = self._busy.pop(done)
+            self._idle.append(actor)
+            whose[index] = self._answer(done)
+        return Scores.concatenate(answers)
 
     def _answer(self, done: Any) -> Scores:
+        """The scores that an actor gave. Arrays that come out of Ray are read-only."""
         try:
             return Scores(*self._ray.get(done))
         except self._ray.exceptions.RayActorError as error:
+            self._waiting.clear()
             raise RunError(f"an actor died {RETRIES + 1} times over the same robots") from error
         except self._ray.exceptions.RayTaskError as error:
-            cause = error.cause
-            raise RunError(f"an actor failed: {type(cause).__name__}: {cause}") from error
+            self._waiting.clear()
+            raise RunError(f"an actor failed: {_cause(error)}") from error
 
-    def prepare(self, blobs: Sequence[bytes]) -> None:
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
         """Load the kernels in every actor, one after the other: the first may compile them."""
         for actor in self._actors:
             self._ray.get(actor.judge.remote(list(blobs)))
@@ -99,6 +112,11 @@ class Cluster:
         self._actors = []
         if self._started:
             self._ray.shutdown()
+
+
+def _cause(error: Any) -> str:
+    cause = error.cause
+    return f"{type(cause).__name__}: {cause}"
 
 
 def _ray() -> Any:

@@ -1,25 +1,59 @@
-"""Judging genomes: nobody is simulated twice."""
+"""Judging genomes: who simulates them, and that nobody is simulated twice."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from functools import cache
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from evolve.encodings.base import Genomes
+from evolve.encodings.base import Encoding, Genomes
 from evolve.scores import Scores
 
-__all__ = ["Judge", "Simulator"]
+if TYPE_CHECKING:
+    from evolve.config import RunConfig
+
+__all__ = ["Here", "Judge", "Simulator", "Ticket"]
+
+
+Ticket = Callable[[], Scores]
+"""Waits for the scores of what was submitted, and returns them; may be called more than once."""
 
 
 class Simulator(Protocol):
-    """Whatever simulates genomes: this process, other processes, other machines."""
+    """Whoever simulates genomes: this process, other processes, other machines."""
 
-    def __call__(self, genomes: Genomes, blobs: Sequence[bytes]) -> Scores:
-        """Scores of n genomes, given both as such and as their bytes."""
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """Begin to simulate n genomes, given both as such and as their bytes."""
+
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
+        """Load the kernels for such genomes, everywhere."""
+
+    def close(self) -> None:
+        """End whatever was started."""
+
+
+class Here:
+    """Simulates genomes in this process, when the scores are waited for."""
+
+    def __init__(self, config: RunConfig, encoding: Encoding) -> None:
+        from evolve.evaluate import Evaluator
+
+        self._evaluator, self._encoding = Evaluator(config), encoding
+
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """The scores are computed the first time that somebody waits for them."""
+        return cache(lambda: self._evaluator(self._encoding.express(genomes)))
+
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
+        """Load the kernels for such genomes."""
+        self._evaluator.prepare(self._encoding.express(genomes))
+
+    def close(self) -> None:
+        """Nothing was started."""
 
 
 class Judge:

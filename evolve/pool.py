@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from evolve.encodings.base import Genomes
 from evolve.errors import RunError
+from evolve.judge import Ticket
 from evolve.scores import Scores
 from evolve.workshop import Workshop, chunks, cores
 
@@ -25,13 +26,35 @@ LIVES = 3
 
 
 @dataclass
+class _Job:
+    """Genomes that were submitted together: their scores in parts, None for those to come."""
+
+    scores: list[Scores | None]
+    failure: Exception | None = None
+
+    @property
+    def done(self) -> bool:
+        return self.failure is not None or None not in self.scores
+
+
+@dataclass
+class _Chunk:
+    """A part of a job, and how many workers died over it."""
+
+    job: _Job
+    index: int
+    blobs: list[bytes]
+    deaths: int = 0
+
+
+@dataclass
 class _Worker:
     """A process, our end of the pipe to it, and the chunk it works on."""
 
     device: str
     process: mp.process.BaseProcess
     pipe: Connection
-    chunk: int | None = None
+    chunk: _Chunk | None = None
 
 
 class Pool:
@@ -48,17 +71,23 @@ class Pool:
         self._config = dump(config)
         devices = config.simulation.devices
         self._threads = max(1, (config.simulation.threads or cores()) // len(devices))
+        self._waiting: deque[_Chunk] = deque()
         self._workers = [self._start(device) for device in devices]
 
-    def __call__(self, genomes: Genomes, blobs: Sequence[bytes]) -> Scores:
-        """Scores of n genomes, by their bytes."""
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """Begin to simulate n genomes, by their bytes; several may be under way at once."""
         parts = chunks(blobs, len(self._workers))
-        return Scores.concatenate(self._judged(parts))
+        job = _Job([None] * len(parts))
+        self._waiting.extend(_Chunk(job, i, part) for i, part in enumerate(parts))
+        self._feed(self._workers)
+        return lambda: self._finished(job, self._workers)
 
-    def prepare(self, blobs: Sequence[bytes]) -> None:
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
         """Load the kernels in every worker, one after the other: the first may compile them."""
         for index in range(len(self._workers)):
-            self._judged([list(blobs)], only=index)
+            job = _Job([None])
+            self._waiting.append(_Chunk(job, 0, list(blobs)))
+            self._finished(job, self._workers[index : index + 1])
 
     def close(self) -> None:
         """End the workers."""
@@ -74,61 +103,65 @@ class Pool:
         """Process ids of the workers."""
         return [worker.process.pid for worker in self._workers]
 
-    def _judged(self, chunks: Sequence[list[bytes]], only: int | None = None) -> list[Scores]:
-        """Scores of each chunk; whoever dies is replaced, and its chunk is done again."""
-        waiting, done = deque(range(len(chunks))), {}
-        deaths = [0] * len(chunks)
-        members = range(len(self._workers)) if only is None else (only,)
+    def _finished(self, job: _Job, workers: Sequence[_Worker]) -> Scores:
+        """Scores of a job; whoever dies over a chunk is replaced, and the chunk is done again."""
         try:
-            while len(done) < len(chunks):
-                for index in members:
-                    worker = self._workers[index]
-                    if worker.chunk is None and waiting:
-                        worker.chunk = waiting.popleft()
-                        self._send(worker, chunks[worker.chunk])
-                busy = [i for i in members if self._workers[i].chunk is not None]
-                wait([self._workers[i].pipe for i in busy])
-                for index in busy:
-                    worker = self._workers[index]
-                    if not worker.pipe.poll():
-                        continue
-                    try:
-                        answer = worker.pipe.recv()
-                    except (EOFError, OSError):
-                        self._mourn(index, deaths, waiting)
-                        continue
-                    if isinstance(answer, Exception):
-                        raise answer
-                    done[worker.chunk], worker.chunk = Scores(*answer), None
+            while not job.done:
+                self._feed(workers)
+                busy = [worker for worker in self._workers if worker.chunk is not None]
+                ready = wait([worker.pipe for worker in busy])
+                for worker in busy:
+                    if worker.pipe in ready:
+                        self._hear(worker)
         except BaseException:
-            # Whatever is still under way belongs to nobody any more.
-            for index in members:
-                if self._workers[index].chunk is not None:
-                    self._replace(index)
+            self._abandon()
             raise
-        return [done[i] for i in range(len(chunks))]
+        if job.failure is not None:
+            self._abandon()
+            raise job.failure
+        return Scores.concatenate(job.scores)
 
-    def _send(self, worker: _Worker, chunk: list[bytes]) -> None:
-        with suppress(OSError):  # it died while idle: reading from it will say so
-            worker.pipe.send(chunk)
+    def _feed(self, workers: Sequence[_Worker]) -> None:
+        """Give waiting chunks to idle workers."""
+        for worker in workers:
+            if worker.chunk is None and self._waiting:
+                worker.chunk = self._waiting.popleft()
+                with suppress(OSError):  # it died while idle: hearing it will say so
+                    worker.pipe.send(worker.chunk.blobs)
 
-    def _mourn(self, index: int, deaths: list[int], waiting: deque[int]) -> None:
-        chunk = self._workers[index].chunk
-        deaths[chunk] += 1
-        code = self._workers[index].process.exitcode
-        if deaths[chunk] >= LIVES:
-            raise RunError(
-                f"{LIVES} worker processes died over the same robots (last exit code {code})"
-            )
-        self._replace(index)
-        waiting.appendleft(chunk)
+    def _hear(self, worker: _Worker) -> None:
+        """Take the answer of a worker that has one, or that has died."""
+        chunk = worker.chunk
+        try:
+            answer = worker.pipe.recv()
+        except (EOFError, OSError):
+            chunk.deaths += 1
+            if chunk.deaths >= LIVES:
+                code = worker.process.exitcode
+                words = f"{LIVES} worker processes died over the same robots"
+                chunk.job.failure = RunError(f"{words} (last exit code {code})")
+            self._replace(worker)
+            self._waiting.appendleft(chunk)
+            return
+        worker.chunk = None
+        if isinstance(answer, Exception):
+            chunk.job.failure = answer
+        else:
+            chunk.job.scores[chunk.index] = Scores(*answer)
 
-    def _replace(self, index: int) -> None:
-        worker = self._workers[index]
+    def _abandon(self) -> None:
+        """Forget what is under way: nobody waits for it any more."""
+        self._waiting.clear()
+        for worker in self._workers:
+            if worker.chunk is not None:
+                self._replace(worker)
+
+    def _replace(self, worker: _Worker) -> None:
         worker.pipe.close()
         worker.process.kill()
         worker.process.join()
-        self._workers[index] = self._start(worker.device)
+        new = self._start(worker.device)
+        worker.process, worker.pipe, worker.chunk = new.process, new.pipe, None
 
     def _start(self, device: str) -> _Worker:
         ours, theirs = self._context.Pipe()

@@ -273,7 +273,7 @@ class Session:
             generation.candidates,
             generation.blobs,
             generation.scores,
-            self.search.optimizer.state(),
+            self.search.state(),
             self._clock.lap(generation),
         )
         return self._clock.progress(self.search, generation)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from evolve.cluster import Cluster
 from evolve.config import RunConfig
-from evolve.evaluate import Evaluator
-from evolve.judge import Judge, Simulator
+from evolve.judge import Here, Judge, Simulator, Ticket
 from evolve.optimizers.base import Candidates, Individuals
 from evolve.pool import Pool
 from evolve.scores import Scores
@@ -34,6 +34,20 @@ class Generation:
     """Seconds it took, evaluation included [s]."""
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """Candidates that were asked for and not told yet."""
+
+    candidates: Candidates
+    blobs: Sequence[bytes]
+    simulated: np.ndarray
+    """Indices of those that nobody had simulated."""
+    ticket: Ticket
+    """Scores of these, perhaps among others."""
+    first: int
+    """Where they begin there."""
+
+
 class Search:
     """Encoding, optimizer and judge of a configuration, and the loop that joins them.
 
@@ -50,18 +64,18 @@ class Search:
         self.simulator = self._make_simulator() if simulator is None else simulator
         self.judge = Judge()
         self.cost, self.seconds = 0, 0.0
+        self.waiting: deque[_Asked] = deque()
 
     def _make_simulator(self) -> Simulator:
         if self.config.simulation.cluster:
             return Cluster(self.config)
         if self.config.simulation.devices:
             return Pool(self.config)
-        evaluator, encoding = Evaluator(self.config), self.encoding
-        return lambda genomes, blobs: evaluator(encoding.express(genomes))
+        return Here(self.config, self.encoding)
 
     def close(self) -> None:
         """End the workers, if there are any."""
-        if self._own and isinstance(self.simulator, (Pool, Cluster)):
+        if self._own:
             self.simulator.close()
 
     @property
@@ -75,24 +89,47 @@ class Search:
             or self.seconds >= (budget.seconds or float("inf"))
         )
 
+    @property
+    def asks(self) -> bool:
+        """Whether another generation is to be asked for before the next is told."""
+        generation = self.optimizer.generation + len(self.waiting)
+        ahead = len(self.waiting) <= self.optimizer.ahead
+        return ahead and (not self.waiting or generation < self.config.generations)
+
     def prepare(self) -> None:
         """Load the kernels, so that the first step takes no longer than the others."""
         genomes = self.encoding.random(self.config.population, Streams(0)(0, Role.INITIAL))
-        if isinstance(self.simulator, (Pool, Cluster)):
-            self.simulator.prepare(self.encoding.to_bytes(genomes))
-        else:
-            Evaluator(self.config).prepare(self.encoding.express(genomes))
+        self.simulator.prepare(genomes, self.encoding.to_bytes(genomes))
 
     def step(self) -> Generation:
         """Search one generation further."""
         return judge_together([self])[0]
 
-    def tell(self, asked: Candidates, blobs: Sequence[bytes], scores: Scores) -> Generation:
-        """Take the scores of the candidates that were asked for."""
-        number = self.optimizer.generation
-        self.optimizer.tell(asked, scores)
+    def tell(self, seconds: float) -> Generation:
+        """Wait for the scores of the candidates asked for first, and tell them."""
+        asked, number = self.waiting.popleft(), self.optimizer.generation
+        if len(asked.simulated):
+            rows = asked.first + np.arange(len(asked.simulated))
+            fresh = [asked.blobs[i] for i in asked.simulated]
+            self.judge.learn(fresh, asked.ticket().take(rows))
+        scores = replace(self.judge.recall(asked.blobs, asked.simulated), wall_time=seconds)
+        self.optimizer.tell(asked.candidates, scores)
         self.cost += int(scores.spring_evaluations.sum())
-        return Generation(number, asked, blobs, scores, 0.0)
+        return Generation(number, asked.candidates, asked.blobs, scores, 0.0)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a resumed search must be given back, as plain arrays: name -> array."""
+        state = self.optimizer.state()
+        if self.waiting:
+            blobs = [blob for asked in self.waiting for blob in asked.blobs]
+            state |= {
+                "waiting": np.array([len(asked.candidates) for asked in self.waiting]),
+                "waiting_ids": np.concatenate([a.candidates.ids for a in self.waiting]),
+                "waiting_parents": np.concatenate([a.candidates.parents for a in self.waiting]),
+                "waiting_lengths": np.array([len(blob) for blob in blobs]),
+                "waiting_genomes": np.frombuffer(b"".join(blobs), np.uint8),
+            }
+        return state
 
     def restore(self, store: Store) -> None:
         """Go to where a record ends."""
@@ -107,6 +144,21 @@ class Search:
             self.seconds = evaluating + driving
             for blobs, scores in store.judged():
                 self.judge.learn(blobs, scores)
+            self._restore_waiting(state)
+
+    def _restore_waiting(self, state: Mapping[str, np.ndarray]) -> None:
+        """Submit again what was under way."""
+        if "waiting" not in state:
+            return
+        ends = np.cumsum(state["waiting_lengths"]).tolist()
+        whole, first = state["waiting_genomes"].tobytes(), 0
+        blobs = [whole[a:b] for a, b in zip([0, *ends[:-1]], ends, strict=True)]
+        for size in state["waiting"].tolist():
+            part = slice(first, first + size)
+            genomes = self.encoding.from_bytes(blobs[part])
+            ids, parents = state["waiting_ids"][part], state["waiting_parents"][part]
+            _submit([self], [Candidates(ids, genomes, parents)], [blobs[part]])
+            first += size
 
 
 def judge_together(searches: Sequence[Search]) -> list[Generation]:
@@ -116,35 +168,40 @@ def judge_together(searches: Sequence[Search]) -> list[Generation]:
     same to the bit as if it were alone.
     """
     started = time.perf_counter()
-    asked = [search.optimizer.ask(search.config.population) for search in searches]
-    blobs = [
-        search.encoding.to_bytes(candidates.genomes)
-        for search, candidates in zip(searches, asked, strict=True)
-    ]
-    new = [search.judge.unknown(own) for search, own in zip(searches, blobs, strict=True)]
-    evaluating = _simulate_new(searches, asked, blobs, new) / len(searches)
-    generations = []
-    for search, candidates, own, simulated in zip(searches, asked, blobs, new, strict=True):
-        scores = replace(search.judge.recall(own, simulated), wall_time=evaluating)
-        generations.append(search.tell(candidates, own, scores))
+    while asking := [search for search in searches if search.asks]:
+        asked = [
+            search.optimizer.ask(search.config.population, [a.candidates for a in search.waiting])
+            for search in asking
+        ]
+        blobs = [s.encoding.to_bytes(a.genomes) for s, a in zip(asking, asked, strict=True)]
+        _submit(asking, asked, blobs)
+    waited = time.perf_counter()
+    for search in searches:
+        search.waiting[0].ticket()
+    evaluating = (time.perf_counter() - waited) / len(searches)
+    generations = [search.tell(evaluating) for search in searches]
     seconds = (time.perf_counter() - started) / len(searches)
     for search in searches:
         search.seconds += seconds
     return [replace(generation, wall_time=seconds) for generation in generations]
 
 
-def _simulate_new(searches, asked, blobs, new) -> float:
-    """Simulate what no judge knows, in one batch, and tell them; the seconds that it took."""
-    started, encoding = time.perf_counter(), searches[0].encoding
-    if not sum(map(len, new)):
-        return 0.0
-    parts = [encoding.take(a.genomes, indices) for a, indices in zip(asked, new, strict=True)]
-    fresh = [[own[i] for i in indices] for own, indices in zip(blobs, new, strict=True)]
-    scores = searches[0].simulator(
-        encoding.concatenate(parts), [blob for part in fresh for blob in part]
-    )
+def _submit(
+    searches: Sequence[Search], asked: Sequence[Candidates], blobs: Sequence[Sequence[bytes]]
+) -> None:
+    """Begin to simulate, in one batch, what the judges of some searches do not know."""
+    new = [search.judge.unknown(own) for search, own in zip(searches, blobs, strict=True)]
+    encoding, ticket = searches[0].encoding, _nothing
+    if sum(map(len, new)):
+        parts = [encoding.take(a.genomes, rows) for a, rows in zip(asked, new, strict=True)]
+        fresh = [own[i] for own, rows in zip(blobs, new, strict=True) for i in rows]
+        ticket = searches[0].simulator.submit(encoding.concatenate(parts), fresh)
     first = 0
-    for search, part in zip(searches, fresh, strict=True):
-        search.judge.learn(part, scores.take(np.arange(first, first + len(part))))
-        first += len(part)
-    return time.perf_counter() - started
+    for search, candidates, own, rows in zip(searches, asked, blobs, new, strict=True):
+        search.waiting.append(_Asked(candidates, own, rows, ticket, first))
+        first += len(rows)
+
+
+def _nothing() -> Scores:
+    """The scores of nobody."""
+    return Scores(np.zeros(0), np.zeros(0))

@@ -13,18 +13,16 @@ from evolve.optimizers.base import (
     NOBODY,
     Individuals,
     OptimizerSettings,
-    PopulationOptimizer,
     Recall,
 )
 from evolve.optimizers.pareto import ranks
-from evolve.optimizers.selection import SelectionSettings, select
-from evolve.optimizers.variation import VariationSettings, children
-from evolve.streams import Role, Streams
+from evolve.optimizers.variation import Breeder, BreedingSettings
+from evolve.streams import Streams
 
 __all__ = ["AgeFitness", "AgeFitnessSettings"]
 
 
-class AgeFitnessSettings(SelectionSettings, VariationSettings):
+class AgeFitnessSettings(BreedingSettings):
     """How many unrelated newcomers every generation gets."""
 
     type: Literal["age_fitness"] = "age_fitness"
@@ -34,7 +32,7 @@ class AgeFitnessSettings(SelectionSettings, VariationSettings):
     """How many individuals compete to become a parent; 1 = no preference. For "tournament"."""
 
 
-class AgeFitness(PopulationOptimizer):
+class AgeFitness(Breeder):
     """Schmidt and Lipson's method (2011): survivors are fit for the age of their lineage.
 
     An individual's age is the number of generations since its oldest ancestor was drawn at random.
@@ -56,9 +54,8 @@ class AgeFitness(PopulationOptimizer):
         self._young_ages = np.zeros(n, np.int64)
         if self._survivors is None:
             return fresh, nobody
-        rng = self.streams(self.generation, Role.SELECTION)
-        parents = select(self.settings, len(self._survivors), (n, 2), rng)
-        young, ids = children(self, self._survivors, parents)
+        parents = self._parents(n)
+        young, ids = self._children(parents)
         newcomers = np.arange(n) >= n - max(1, round(self.settings.newcomers * n))
         both = self.encoding.concatenate([young, fresh])
         genomes = self.encoding.take(both, np.arange(n) + n * newcomers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -72,6 +72,7 @@ class Optimizer(ABC):
 
     Attributes:
         generation: How often scores were told.
+        turn: Which generation is asked for.
         evaluations: How many scores were told.
         failures: How many of them were without fitness.
         best_id: Id of the best individual so far, `NOBODY` while nobody has a fitness. Of equals,
@@ -81,22 +82,36 @@ class Optimizer(ABC):
 
     Settings: ClassVar[type[OptimizerSettings]]
 
+    @property
+    def ahead(self) -> int:
+        """How many generations may be asked for before the scores of the first are told."""
+        return 0
+
     def __init__(self, encoding: Encoding, streams: Streams, settings: OptimizerSettings) -> None:
         self.encoding = encoding
         self.streams = streams
         self.settings = settings
         self.generation = 0
+        self.turn = 0
         self.evaluations = 0
         self.failures = 0
         self.best_id = NOBODY
         self.best_fitness = float("nan")
 
-    def ask(self, n: int) -> Candidates:
-        """Make n candidates (n >= 1) for the current generation."""
+    def ask(self, n: int, waiting: Sequence[Candidates] = ()) -> Candidates:
+        """Make n candidates (n >= 1).
+
+        Args:
+            n: How many.
+            waiting: Candidates that were asked for and will be told before these; none for an
+                optimizer that learns from each generation before the next (`ahead` = 0).
+        """
         if n < 1:
             raise ValueError(f"an optimizer is asked for at least one candidate, not {n}")
+        self.turn = self.generation + len(waiting)
         genomes, parents = self._ask(n)
-        ids = self.evaluations + 1 + np.arange(n, dtype=np.int64)
+        first = self.evaluations + sum(map(len, waiting)) + 1
+        ids = first + np.arange(n, dtype=np.int64)
         return Candidates(ids, genomes, np.asarray(parents, dtype=np.int64))
 
     def tell(self, candidates: Candidates, scores: Scores) -> None:
@@ -171,7 +186,7 @@ class PopulationOptimizer(Optimizer):
 
     def _newcomers(self, n: int) -> tuple[Genomes, np.ndarray]:
         """Unrelated genomes without parents, as `_ask` returns them."""
-        rng = self.streams(self.generation, Role.INITIAL)
+        rng = self.streams(self.turn, Role.INITIAL)
         return self.encoding.random(n, rng), np.full((n, 2), NOBODY)
 
     def _state(self) -> dict[str, np.ndarray]:

@@ -7,16 +7,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from evolve.encodings.base import Genomes
-from evolve.optimizers.base import Individuals, OptimizerSettings, PopulationOptimizer
-from evolve.optimizers.selection import SelectionSettings, order, select
-from evolve.optimizers.variation import VariationSettings, children
-from evolve.streams import Role
+from evolve.optimizers.base import Individuals, OptimizerSettings
+from evolve.optimizers.selection import order
+from evolve.optimizers.variation import Breeder, BreedingSettings
 
 __all__ = ["GeneticAlgorithm", "GeneticSettings"]
 
 
-class GeneticSettings(SelectionSettings, VariationSettings):
+class GeneticSettings(BreedingSettings):
     """How strongly the fit are preferred, and how their children come about."""
 
     type: Literal["genetic"] = "genetic"
@@ -24,19 +22,12 @@ class GeneticSettings(SelectionSettings, VariationSettings):
     """Share of the population reserved for the best of all so far, who live on unchanged."""
 
 
-class GeneticAlgorithm(PopulationOptimizer):
+class GeneticAlgorithm(Breeder):
     """Children of the selected replace all but an elite, which is not evaluated again."""
 
     Settings: ClassVar[type[OptimizerSettings]] = GeneticSettings
 
     settings: GeneticSettings
-
-    def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
-        if self._survivors is None:
-            return self._newcomers(n)
-        rng = self.streams(self.generation, Role.SELECTION)
-        parents = select(self.settings, len(self._survivors), (n, 2), rng)
-        return children(self, self._survivors, parents)
 
     def _tell(self, individuals: Individuals) -> None:
         if self._survivors is None:

@@ -7,16 +7,16 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from evolve.encodings.base import Encoding, Genomes
+from evolve.encodings.base import Encoding
 from evolve.errors import RunError
-from evolve.optimizers.base import Individuals, OptimizerSettings, PopulationOptimizer
-from evolve.optimizers.variation import VariationSettings, children
+from evolve.optimizers.base import Individuals, OptimizerSettings
+from evolve.optimizers.variation import Breeder, BreedingSettings
 from evolve.streams import Role, Streams
 
 __all__ = ["MapElites", "MapElitesSettings"]
 
 
-class MapElitesSettings(VariationSettings):
+class MapElitesSettings(BreedingSettings):
     """The grid of behaviours."""
 
     type: Literal["map_elites"] = "map_elites"
@@ -49,7 +49,7 @@ class MapElitesSettings(VariationSettings):
         return self
 
 
-class MapElites(PopulationOptimizer):
+class MapElites(Breeder):
     """Mouret and Clune (2015): a grid over behaviour, in every cell the best of all so far.
 
     Parents are drawn evenly from the filled cells. The survivors are the elites, in the order of
@@ -77,11 +77,9 @@ class MapElites(PopulationOptimizer):
         """Cell of each individual in the flattened grid, shape (n,)."""
         return self._make_archive().index_of(self._measures(individuals))
 
-    def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
-        if self._survivors is None:
-            return self._newcomers(n)
-        rng = self.streams(self.generation, Role.SELECTION)
-        return children(self, self._survivors, rng.integers(len(self._survivors), size=(n, 2)))
+    def _parents(self, n: int) -> np.ndarray:
+        rng = self.streams(self.turn, Role.SELECTION)
+        return rng.integers(len(self._survivors), size=(n, 2))
 
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
-from evolve.encodings.base import Genomes
-from evolve.optimizers.base import Individuals, OptimizerSettings, PopulationOptimizer
+from evolve.optimizers.base import Individuals, OptimizerSettings
 from evolve.optimizers.pareto import best_first, objectives
-from evolve.optimizers.selection import SelectionSettings, select
-from evolve.optimizers.variation import VariationSettings, children
-from evolve.streams import Role
+from evolve.optimizers.variation import Breeder, BreedingSettings
 
 __all__ = ["Nsga2", "Nsga2Settings"]
 
 
-class Nsga2Settings(SelectionSettings, VariationSettings):
+class Nsga2Settings(BreedingSettings):
     """What to optimize at once."""
 
     type: Literal["nsga2"] = "nsga2"
@@ -33,19 +29,12 @@ class Nsga2Settings(SelectionSettings, VariationSettings):
         return tuple(name for name in names if name != "fitness")
 
 
-class Nsga2(PopulationOptimizer):
+class Nsga2(Breeder):
     """Deb et al. (2002): the better Pareto front survives, of the last front the lonelier."""
 
     Settings: ClassVar[type[OptimizerSettings]] = Nsga2Settings
 
     settings: Nsga2Settings
-
-    def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
-        if self._survivors is None:
-            return self._newcomers(n)
-        rng = self.streams(self.generation, Role.SELECTION)
-        parents = select(self.settings, len(self._survivors), (n, 2), rng)
-        return children(self, self._survivors, parents)
 
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals

@@ -26,7 +26,7 @@ class RandomSearch(Optimizer):
     Settings: ClassVar[type[OptimizerSettings]] = RandomSettings
 
     def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
-        rng = self.streams(self.generation, Role.INITIAL)
+        rng = self.streams(self.turn, Role.INITIAL)
         return self.encoding.random(n, rng), np.full((n, 2), NOBODY)
 
     def _tell(self, individuals: Individuals) -> None:

@@ -1,4 +1,4 @@
-"""Variation: children of chosen parents, by the operators of the encoding."""
+"""Variation: children of selected parents, by the operators of the encoding."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import numpy as np
 from pydantic import Field
 
 from evolve.encodings.base import Genomes
-from evolve.optimizers.base import NOBODY, Individuals, OptimizerSettings, PopulationOptimizer
+from evolve.optimizers.base import NOBODY, PopulationOptimizer
+from evolve.optimizers.selection import SelectionSettings, select
 from evolve.streams import Role
 
-__all__ = ["VariationSettings", "children"]
+__all__ = ["Breeder", "BreedingSettings"]
 
 
-class VariationSettings(OptimizerSettings):
-    """How children come about."""
+class BreedingSettings(SelectionSettings):
+    """How strongly the fit are preferred, and how their children come about."""
 
     crossover_rate: float = Field(0.7, ge=0.0, le=1.0)
     """Share of the children with two parents; the others have one."""
@@ -21,29 +22,34 @@ class VariationSettings(OptimizerSettings):
     """Share of the children with two parents that mutate; children of one always do."""
 
 
-def children(
-    optimizer: PopulationOptimizer, pool: Individuals, parents: np.ndarray
-) -> tuple[Genomes, np.ndarray]:
-    """Make a child of every pair of parents: crossed over or not, mutated or not.
+class Breeder(PopulationOptimizer):
+    """Whoever survives has children: selected, crossed over or not, mutated or not."""
 
-    Args:
-        optimizer: Whose encoding, streams and settings (`VariationSettings`) are used.
-        pool: Where the parents are.
-        parents: Their places in the pool, shape (n, 2).
+    settings: BreedingSettings
 
-    Returns:
-        n genomes, and the ids of their parents, shape (n, 2).
-    """
-    encoding, streams, generation = optimizer.encoding, optimizer.streams, optimizer.generation
-    n, settings = len(parents), optimizer.settings
-    crossed = streams(generation, Role.CROSSOVER, 1).random(n) < settings.crossover_rate
-    ids = pool.ids[parents]
-    ids[~crossed, 1] = NOBODY
-    mothers = encoding.take(pool.genomes, parents[:, 0])
-    fathers = encoding.take(pool.genomes, parents[:, 1])
-    both = encoding.cross(mothers, fathers, streams(generation, Role.CROSSOVER))
-    young = encoding.take(encoding.concatenate([mothers, both]), np.arange(n) + n * crossed)
-    mutants = encoding.mutate(young, streams(generation, Role.MUTATION))
-    coins = streams(generation, Role.MUTATION, 1).random(n)
-    mutated = ~crossed | (coins < settings.mutation_rate)
-    return encoding.take(encoding.concatenate([young, mutants]), np.arange(n) + n * mutated), ids
+    def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
+        if self._survivors is None:
+            return self._newcomers(n)
+        return self._children(self._parents(n))
+
+    def _parents(self, n: int) -> np.ndarray:
+        """Places among the survivors of the parents of n children, shape (n, 2)."""
+        rng = self.streams(self.turn, Role.SELECTION)
+        return select(self.settings, len(self._survivors), (n, 2), rng)
+
+    def _children(self, parents: np.ndarray) -> tuple[Genomes, np.ndarray]:
+        """A child of every pair of survivors, shape (n, 2): n genomes, and the parents' ids."""
+        encoding, streams, turn, pool = self.encoding, self.streams, self.turn, self._survivors
+        n, settings = len(parents), self.settings
+        crossed = streams(turn, Role.CROSSOVER, 1).random(n) < settings.crossover_rate
+        ids = pool.ids[parents]
+        ids[~crossed, 1] = NOBODY
+        mothers = encoding.take(pool.genomes, parents[:, 0])
+        fathers = encoding.take(pool.genomes, parents[:, 1])
+        both = encoding.cross(mothers, fathers, streams(turn, Role.CROSSOVER))
+        young = encoding.take(encoding.concatenate([mothers, both]), np.arange(n) + n * crossed)
+        mutants = encoding.mutate(young, streams(turn, Role.MUTATION))
+        coins = streams(turn, Role.MUTATION, 1).random(n)
+        mutated = ~crossed | (coins < settings.mutation_rate)
+        both = encoding.concatenate([young, mutants])
+        return encoding.take(both, np.arange(n) + n * mutated), ids

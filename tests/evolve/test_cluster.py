@@ -36,7 +36,7 @@ def test_actors_change_no_bit_and_survive_a_kill():
         again = [ray.get(actor.__ray_call__.remote(_pid)) for actor in spread.simulator._actors]
         assert again[0] != pids[0] and again[1] == pids[1]
         with pytest.raises(RunError, match="an actor failed: ValueError: genome 0 has 3 bytes"):
-            spread.simulator([], [b"abc"])
+            spread.simulator.submit([], [b"abc"])()
     finally:
         spread.close()
     assert not ray.is_initialized()

@@ -154,11 +154,11 @@ def test_a_worker_that_fails_says_why():
     pool = Pool(config)
     try:
         with pytest.raises(RunError, match=r"a worker on cpu failed: ValueError: genome 0 has 3"):
-            pool([], [b"abc"])
+            pool.submit([], [b"abc"])()
         blobs = config.make_encoding().to_bytes(
             config.make_encoding().random(3, np.random.default_rng(1))
         )
-        assert len(pool([], blobs)) == 3  # and works on
+        assert len(pool.submit([], blobs)()) == 3  # and works on
     finally:
         pool.close()
 
@@ -174,3 +174,34 @@ def _alive(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+# -- steady state: asked ahead --------------------------------------------------------------------
+
+STEADY = TINY | {"optimizer.type": "steady_state", "optimizer.living": 48, "generations": 6}
+
+
+@pytest.mark.parametrize("ahead", [0, 1, 2])
+def test_asking_ahead_changes_no_bit_on_any_number_of_workers_or_when_resumed(ahead, tmp_path):
+    config = load("cube", STEADY | {"optimizer.ahead": ahead})
+    whole = digest(evolved(config, tmp_path / "whole"))
+    pieces = Run.create(config, tmp_path / "pieces")
+    while True:
+        told = []
+        if pieces.evolve(told.append, lambda told=told: len(told) > 1):
+            break
+        pieces = Run.open(pieces.directory)
+    assert digest(pieces) == whole
+    if ahead == 1:
+        two = load("cube", STEADY | {"simulation.devices": ["cpu", "cpu"]})
+        assert digest(evolved(two, tmp_path / "two")) == whole
+
+
+def test_children_descend_from_who_was_told_before_they_were_asked_for():
+    search = Search(load("cube", STEADY | {"optimizer.ahead": 2, "generations": 8}))
+    while not search.finished:
+        generation = search.step()
+        parents = generation.candidates.parents[generation.candidates.parents > 0]
+        assert (parents <= 24 * max(generation.number - 2, 0)).all()
+    assert len(parents) > 20 and not search.waiting
+    assert search.optimizer.evaluations == 24 * 8
