@@ -53,7 +53,7 @@ class Simulation:
             results agree to rounding. ``"auto"`` chooses for each robot: on a CPU ``"lanes"``
             (many robots at once, one in each SIMD lane), for a large body ``"flat"`` (its masses
             shared by all threads); on a GPU ``"block"`` (whole robots in a block of threads, up to
-            512 masses, 384 in float64), for a larger body ``"flat"``. A CPU runs ``"block"`` too,
+            384 masses, 512 in float32), for a larger body ``"flat"``. A CPU runs ``"block"`` too,
             slowly, to verify.
 
     Raises:

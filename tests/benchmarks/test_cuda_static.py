@@ -1,0 +1,56 @@
+"""The CUDA kernels, compiled ahead of time and taken apart: no GPU is needed for that."""
+
+import pytest
+
+from benchmarks import cuda_static
+from warp_springs.layouts import BLOCK_SIZES
+
+CASES = [
+    ("block", "float32", "walking", "leapfrog", True),
+    ("block", "mixed", "walking", "chin4", False),
+    ("block", "float64", "walking", "chin4", True),
+    ("flat", "mixed", "walking", "chin4", True),
+]
+
+
+@pytest.mark.parametrize("arch", [80, 90, 100])
+@pytest.mark.parametrize("case", CASES, ids=lambda case: "-".join(map(str, case)))
+def test_kernels_compile_without_spills(case, arch, tmp_path):
+    layout, precision, scene, integrator, ledger = case
+    about = cuda_static.features(layout, precision, scene, integrator, ledger)
+    # The largest blocks have the fewest registers for a thread.
+    path = cuda_static.compiled(about, arch, BLOCK_SIZES[precision][-1], tmp_path)
+    used = cuda_static.resources(path)
+    assert {name: row["spilled"] for name, row in used.items() if row["spilled"]} == {}
+    expected = {"advance"} if layout == "block" else {"kick", "find", "settle", "wind", "tick"}
+    assert expected <= used.keys()
+
+
+@pytest.mark.parametrize("layout", ["block", "flat"])
+def test_the_loop_over_springs_is_what_it_should_be(layout, tmp_path):
+    about = cuda_static.features(layout, "float32", "walking")
+    code = cuda_static.instructions(cuda_static.compiled(about, 90, 256, tmp_path))
+    loop = cuda_static.spring_loop(code["advance" if layout == "block" else "kick"])
+    assert loop.widest == 16
+    assert loop.bytes == 4 + 16 + 16  # the neighbour's number, four coefficients, its position
+    assert loop.doubles == 0
+    assert 15 < loop.instructions < 30
+    assert not any(op.startswith(("LDL", "STL")) for op, _ in code[next(iter(code))])
+
+
+def test_limits_follow_from_the_loop():
+    chip = cuda_static.CHIPS["H100"]
+    loop = cuda_static.Loop(instructions=64.0, doubles=0.0, roots=1.0, bytes=4.0, widest=16)
+    assert loop.springs_per_second(chip) == pytest.approx(chip.cores * chip.clock)
+    starved = cuda_static.Loop(instructions=64.0, doubles=0.0, roots=1.0, bytes=128.0, widest=16)
+    assert starved.springs_per_second(chip) == pytest.approx(0.5 * chip.cores * chip.clock)
+    doubles = cuda_static.Loop(instructions=64.0, doubles=64.0, roots=1.0, bytes=4.0, widest=16)
+    assert doubles.springs_per_second(chip) == pytest.approx(0.5 * chip.cores * chip.clock)
+
+
+def test_the_table_has_a_line_for_every_row(tmp_path):
+    row = cuda_static.measure("A100", "block", "float32", "springs", tmp_path)
+    lines = cuda_static.table([row, row]).splitlines()
+    assert len(lines) == 3
+    assert f"{row['instructions_per_spring']:.1f}" in lines[1]
+    assert row["memory_limit"] == pytest.approx(2.039e12 / 24)
