@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -91,7 +92,7 @@ def energy_panels(panels: Sequence[tuple[str, Result, int]]) -> Figure:
     import warp_springs as ws
 
     alone = len(panels) == 1
-    columns = min(len(panels), 4 if len(panels) > 6 else 3)
+    columns = min(4, math.ceil(math.sqrt(len(panels))))
     rows = -(-len(panels) // columns)
     figure = ws.plots.figure(9.0, 6.0) if alone else ws.plots.figure(4.6 * columns, 1 + 3.2 * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from warp_springs.config import SceneFile
     from warp_springs.result import Result
 
-__all__ = ["as_markdown", "energy_change", "outcome", "parameters"]
+__all__ = ["as_markdown", "energy_change", "figures", "outcome", "parameters"]
 
 Row = tuple[str, str]
 
@@ -165,12 +165,13 @@ def _robots(config: SceneFile, result: Result) -> Iterator[Row]:
         if key in told or len(told) == MOST_ROBOTS:
             continue
         told[key] = name = config.names[index]
-        for what, value in _figures(robot):
+        for what, value in figures(robot):
             yield f"{name}: {what}", value
         yield f"{name}: stable step", f"{stable_dt(robot, result.scene, result.integrator):.3g} s"
 
 
-def _figures(robot: Robot) -> Iterator[Row]:
+def figures(robot: Robot) -> Iterator[Row]:
+    """What a robot is, in figures: counts, mass, size, ranges of its fields, materials."""
     yield "masses, springs, faces", f"{robot.n_masses:,}, {robot.n_springs:,}, {len(robot.faces):,}"
     yield "mass", f"{robot.mass:g} kg"
     yield "size", " x ".join(f"{v:.4g}" for v in np.ptp(robot.bounds, axis=0)) + " m"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -14,7 +16,7 @@ import numpy as np
 from warp_springs.robot import Robot
 from warp_springs.variants import Variants
 
-__all__ = ["Reader", "Writer", "check_header"]
+__all__ = ["Reader", "Writer", "check_header", "format_of"]
 
 _PACKAGE = __name__.partition(".")[0]
 
@@ -131,6 +133,22 @@ class Reader:
             if not isinstance(value, np.ndarray):
                 object.__setattr__(made, name, value)
         return made
+
+
+def format_of(path: str | os.PathLike[str]) -> str:
+    """What a saved file says that it is.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is none of ours; the message names it.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return json.loads(file["header"].item())["format"]
+    except OSError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of its contents
+        raise ValueError(f"{path}: this is neither a saved robot nor a saved result") from error
 
 
 def check_header(header: Mapping[str, Any], form: str, version: int) -> None:
