@@ -466,7 +466,8 @@ def face_normals(part):
 @pytest.mark.parametrize("detail", [usd_geometry.COARSE, usd_geometry.FINE])
 def test_meshes_face_outward(cube, detail):
     middle = cube.positions - cube.center_of_mass
-    tubes = usd_geometry.tubes(middle, cube.springs, 0.01, detail.sides)
+    springs = np.concatenate([cube.springs, cube.springs[:, ::-1]])
+    tubes = usd_geometry.tubes(middle, springs, 0.01, detail.sides)
     balls = usd_geometry.balls(middle, 0.02, detail.cuts)
     for part in (tubes, balls):
         np.testing.assert_allclose(np.linalg.norm(part.normals, axis=1), 1.0)

@@ -61,12 +61,16 @@ def tubes(positions: FloatArray, springs: IntArray, radius: float, sides: int) -
     """
     n, count = sides, len(springs)
     table = ring_normals(sides)
-    axis = nearest_axes(positions[springs[:, 1]] - positions[springs[:, 0]])
+    along = positions[springs[:, 1]] - positions[springs[:, 0]]
+    axis = nearest_axes(along)
     ring = table.reshape(-1, n, 3)[axis]
     ends = positions[springs][:, :, None] + radius * ring[:, None]
     side, spring = np.arange(n)[:, None], np.arange(count)
     ahead = (side + 1) % n
-    corners = np.stack(np.broadcast_arrays(side, ahead, ahead + n, side + n), axis=-1)
+    # Counter-clockwise seen from outside also where the table's direction is the opposite one.
+    turned = np.einsum("si,si->s", axes()[axis], along) < 0.0
+    first, second = np.where(turned, ahead, side), np.where(turned, side, ahead)
+    corners = np.stack([first, second, second + n, first + n], axis=-1)
     return Part(
         ends.reshape(-1, 3),
         (corners + 2 * n * spring[:, None]).reshape(-1, 4).astype(np.int32),

@@ -74,7 +74,7 @@ def add_lights(stage: Usd.Stage, distance: float) -> None:
     lights = WORLD.AppendChild("Lights")
     UsdGeom.Xform.Define(stage, lights)
     key = UsdLux.DistantLight.Define(stage, lights.AppendChild("Key"))
-    key.CreateIntensityAttr(2.0)
+    key.CreateIntensityAttr(1.0)  # Blender takes it for four times as much
     key.CreateAngleAttr(1.5)
     key.CreateNormalizeAttr(True)
     turn = Gf.Rotation(Gf.Vec3d.XAxis(), 38.0) * Gf.Rotation(Gf.Vec3d.YAxis(), -22.0)
@@ -82,7 +82,7 @@ def add_lights(stage: Usd.Stage, distance: float) -> None:
     UsdGeom.Xformable(key).AddTranslateOp().Set(distance * turn.TransformDir(Gf.Vec3d.ZAxis()))
     UsdGeom.Xformable(key).AddOrientOp().Set(Gf.Quatf(turn.GetQuat()))
     sky = UsdLux.DomeLight.Define(stage, lights.AppendChild("Sky"))
-    sky.CreateIntensityAttr(0.4)
+    sky.CreateIntensityAttr(0.5)
     sky.CreateColorAttr(Gf.Vec3f(*appearance.SKY))
 
 
