@@ -22,20 +22,20 @@ def tables(console: Console, title: str, rows: list[Row]) -> None:
     names = list(dict.fromkeys(row.program.name for row in rows))
     counts = sorted({row.program.threads for row in rows})
     found = {(row.program.name, row.program.threads): row for row in rows}
-    console.print(f"\n[bold]{title}[/]; ratio: how many times faster warp_springs is")
+    console.print(f"\n[bold]{title}[/]\nM springs/s, and how many times faster warp_springs is")
     table = Table()
     table.add_column("program", no_wrap=True)
     for count in counts:
-        table.add_column(f"{_cores(count)}\nM springs/s", justify="right")
-        table.add_column("ratio", justify="right")
-    table.add_column("differs\nby [m]", justify="right")
-    table.add_column("first\nuse [s]", justify="right")
+        table.add_column(_cores(count), justify="right")
+        table.add_column("", justify="right")
+    table.add_column("differs by", justify="right")
+    table.add_column("first use", justify="right")
     for name in sorted(names, key=lambda name: -_fastest(name, rows)):
         line = [name]
         mine = [found[name, count] for count in counts if (name, count) in found]
         for count in counts:
             line += _cells(found, name, count)
-        line += [f"{mine[0].error:.0e}", f"{mine[0].first_use:.1f}"]
+        line += [f"{mine[0].error:.0e} m", f"{mine[0].first_use:.1f} s"]
         table.add_row(*line)
     console.print(table)
     _remarks(console, rows)

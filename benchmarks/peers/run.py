@@ -73,7 +73,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--robots", type=int, default=1024, help="population of the table")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=0.2, help="of each program in each round")
-    parser.add_argument("--json", type=Path, default=FIGURES / "peers.json")
+    parser.add_argument("--json", type=Path, default=Path("out/peers.json"))
     parser.add_argument("--figure", type=Path, default=FIGURES / "peers.png")
     args = parser.parse_args()
     if args.quick:
