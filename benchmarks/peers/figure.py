@@ -8,7 +8,7 @@ __all__ = ["draw"]
 STYLES = {
     "warp_springs": {"color": "#c2410c", "linewidth": 3.0, "zorder": 5},
     "C++ limit": {"color": "#111827", "linewidth": 1.8, "linestyle": (0, (4, 2))},
-    "C++ plain": {"color": "#6b7280"},
+    "C++ plain": {"color": "#6b7280", "linestyle": ":"},
     "Taichi lanes": {"color": "#0f766e"},
     "Taichi": {"color": "#0f766e", "linestyle": ":"},
     "Numba lanes": {"color": "#1d4ed8"},
@@ -55,7 +55,7 @@ def draw(rows: list[dict], title: str, path: Path) -> None:
 
 def _label(axes, ends: list[tuple[float, str, str]], last: int) -> None:
     """Names at the ends of the lines, moved apart where they would overlap."""
-    apart, below = 1.32, 0.0
+    apart, below = 1.4, 0.0
     for rate, name, color in sorted(ends):
         below = max(rate, below * apart)
         bold = "bold" if name == "warp_springs" else "normal"

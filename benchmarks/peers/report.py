@@ -76,7 +76,11 @@ def _cells(found: dict, name: str, count: int) -> list[str]:
     if row.failure:
         return ["failed", ""]
     ratio = _ratio(ours.times_faster(row)) if ours and name != OURS else ""
-    return [f"{row.rate / 1e6:,.1f}" if row.rate < 1e7 else f"{row.rate / 1e6:,.0f}", ratio]
+    return [_rate(row.rate / 1e6), ratio]
+
+
+def _rate(millions: float) -> str:
+    return f"{millions:,.0f}" if millions >= 10 else f"{millions:.2g}"
 
 
 def _ratio(value: float) -> str:

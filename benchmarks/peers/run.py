@@ -51,12 +51,20 @@ def main() -> None:
             if "sweep" in args.part:
                 lines = sweep(console, fleet, args, status.update)
                 known = report.write(args.json, fleet, sweep=lines)
-                title = f"Cubes of 28 springs, float32, {processor()}, {len(cores())} cores"
-                draw(known["sweep"], f"{title}\n{FEATURES}", args.figure)
+                draw(known["sweep"], title(), args.figure)
                 console.print(f"wrote {args.figure}")
         finally:
             fleet.stop()
     console.print(f"wrote {args.json}")
+
+
+def title() -> str:
+    """What stands above the plot."""
+    return (
+        f"Cubes of 28 springs, float32; {processor()}, the better of 1 and {len(cores())} cores\n"
+        f"{FEATURES}\n"
+        "dotted: as its users ordinarily write it; solid: by an expert"
+    )
 
 
 def arguments() -> argparse.Namespace:
