@@ -188,7 +188,7 @@ class RunConfig(configs.Section):
     generations: int = Field(60, ge=1)
     """How many, at most."""
     budget: BudgetConfig = BudgetConfig()
-    body: configs.AnyShape
+    body: configs.AnyBody
     encoding: AnyEncoding
     optimizer: AnyOptimizer
     scene: SceneConfig = SceneConfig()

@@ -38,7 +38,7 @@ def load(source: str | Path, overrides: Mapping[str, Any] | None = None) -> RunC
     if path.suffix == ".toml" or path.is_file():
         with _our_errors():
             text = configs.read_text(path)
-        return parse(text, str(source), overrides)
+        return parse(text, str(source), overrides, path.parent)
     names = preset_names()
     if str(source) not in names:
         raise ConfigError(
@@ -49,10 +49,15 @@ def load(source: str | Path, overrides: Mapping[str, Any] | None = None) -> RunC
     return parse(preset.read_text(encoding="utf-8"), f"preset {source}", overrides)
 
 
-def parse(text: str, source: str, overrides: Mapping[str, Any] | None = None) -> RunConfig:
-    """Read TOML text; `source` names it in errors. Raises ConfigError like `load`."""
+def parse(
+    text: str,
+    source: str,
+    overrides: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
+) -> RunConfig:
+    """Read TOML text; `source` names it in errors, files lie in `folder`. Errors as of `load`."""
     with _our_errors():
-        return configs.parse(RunConfig, text, source, overrides, kept=_common_keys)
+        return configs.parse(RunConfig, text, source, overrides, kept=_common_keys, folder=folder)
 
 
 def validate(data: Mapping[str, Any], source: str) -> RunConfig:

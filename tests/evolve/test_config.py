@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import warp_springs as ws
 from evolve.encodings import ENCODINGS
 from evolve.errors import ConfigError
 from evolve.optimizers import OPTIMIZERS
@@ -70,6 +71,20 @@ def test_every_body_can_be_built(body, springs, mass):
     robot = load("cube", {"body": body}).body.build()
     assert robot.n_springs == springs
     assert robot.mass == pytest.approx(mass)
+
+
+def test_bodies_may_come_from_files_beside_the_configuration(tmp_path):
+    body = ws.shapes.sphere(subdivisions=1).made_of(ws.materials.BONE)
+    body.save(tmp_path / "ball.npz")
+    ws.write_mesh(body, tmp_path / "ball.vtu")
+    path = tmp_path / "mine.toml"
+    text = dump(load("cube", {"body": {"shape": "tetrahedron"}}))
+    path.write_text(text)
+    saved = load(path, {"body": {"shape": "saved", "path": "ball.npz"}})
+    assert saved.body.build() == body
+    assert parse(dump(saved), "a copy in another folder").body.build() == body
+    mesh = load(path, {"body": {"shape": "mesh", "path": "ball.vtu"}})
+    assert np.array_equal(mesh.make_encoding().body.springs, body.springs)
 
 
 def test_layers_are_maps_seen_from_above():

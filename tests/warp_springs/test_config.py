@@ -154,9 +154,16 @@ def test_elements_of_a_robot(scene):
         "robot.shoes": [{"masses": [2, 3], "static_friction": 0.04}],
         "robot.cables": {"springs": [5]},
         "robot.dashpots": [{"ratio": 0.1}],
+        "robot.loads": [{"masses": [7], "mass": 0.5}],
     }
     (robot,) = scene(changes=changes).build_robots()
-    expected = ws.shapes.cube().with_cables([5]).with_dashpots(0.1).fixed([0], "xz")
+    expected = (
+        ws.shapes.cube()
+        .replace(masses=[0.1] * 7 + [0.5])
+        .with_cables([5])
+        .with_dashpots(0.1)
+        .fixed([0], "xz")
+    )
     expected = expected.held_to(ws.Sphere(center=(0, 0, 0), radius=0.2), [7])
     expected = expected.tethered([1], 5.0, end=2.0).shod([2, 3], static_friction=0.04)
     assert robot == expected.pushed([0, 1, 2, 3], (1, 0, 0), duration=0.1)

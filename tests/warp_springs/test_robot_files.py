@@ -51,6 +51,13 @@ def test_the_file_is_plain_numpy(tmp_path):
     assert header["format"] == "warp_springs robot" and header["version"] == 1
 
 
+def test_results_keep_the_materials_of_their_robots(tmp_path):
+    result = ws.Simulation([material()] * 2).run(0.01, fps=100)
+    loaded = ws.Result.load(result.save(tmp_path / "result.npz"))
+    assert loaded.robots[1] == material()
+    assert loaded.robots[1].materials == (BONE, MUSCLE)
+
+
 def changed(path, **entries):
     with np.load(path) as file:
         content = {name: file[name] for name in file.files} | entries

@@ -139,6 +139,13 @@ class ActuationConfig(Springs):
         return np.broadcast_to(self.phase, count)
 
 
+class LoadConfig(Masses):
+    """The mass of some points."""
+
+    mass: float = Field(gt=0.0)
+    """Of each [kg]."""
+
+
 class PushConfig(Masses):
     """A force on each of some masses for a while."""
 
@@ -228,11 +235,13 @@ class DashpotConfig(Springs):
 
 
 class RotationConfig(Section):
-    """A turn about an axis through the centre of mass."""
+    """A turn about an axis, before the body goes to its position."""
 
     axis: Triple = (0.0, 0.0, 1.0)
     angle: float
     """[rad]"""
+    about: Triple | None = None
+    """A point on the axis [m]; the centre of mass when left out."""
 
 
 class RobotConfig(Section):
@@ -246,6 +255,8 @@ class RobotConfig(Section):
     """Applied in this order."""
     weighed: bool = False
     """Whether the masses follow from the densities of the materials."""
+    loads: tuple[LoadConfig, ...] = ()
+    """Points with a mass of their own."""
     actuation: tuple[ActuationConfig, ...] = ()
     """A list of tables applied in this order, or one table."""
     cables: Springs | None = None
@@ -300,6 +311,10 @@ class RobotConfig(Section):
             robot = robot.made_of(entry.material(), where=entry.rows(robot))
         if self.weighed:
             robot = robot.weighed()
+        for entry in self.loads:
+            masses = robot.masses.copy()
+            masses[entry.rows(robot)] = entry.mass
+            robot = robot.replace(masses=masses)
         for muscles in self.actuation:
             robot = muscles.applied(robot)
         if self.cables is not None:
@@ -322,7 +337,7 @@ class RobotConfig(Section):
     def _started(self, robot: Robot, place: Triple) -> Robot:
         """The robot where it starts, and moving as it starts."""
         if self.rotation is not None:
-            robot = robot.rotated(self.rotation.axis, self.rotation.angle)
+            robot = robot.rotated(**self.rotation.model_dump())
         robot = robot.moved(place)
         if any(self.velocity):
             robot = robot.moving(self.velocity)
