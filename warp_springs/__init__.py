@@ -35,6 +35,8 @@ __all__ = [
     "HeightField",
     "Limits",
     "Line",
+    "LiveLine",
+    "LiveServer",
     "Material",
     "Plane",
     "Push",
@@ -74,6 +76,8 @@ except PackageNotFoundError:  # a source tree that was never installed
 _LAZY = {
     "config": ("warp_springs.config", None),
     "Document": ("warp_springs.view.document", "Document"),
+    "LiveLine": ("warp_springs.view.live", "LiveLine"),
+    "LiveServer": ("warp_springs.view.live", "LiveServer"),
     "export_html": ("warp_springs.view.page", "export_html"),
     "export_usd": ("warp_springs.io.usd", "export_usd"),
     "html_page": ("warp_springs.view.page", "html_page"),

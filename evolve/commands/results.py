@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
-from evolve.commands.shared import Folder, print_written
+from evolve.commands.shared import Flag, Folder, print_written
 from evolve.errors import RunError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Report:
     """Where to write the report, otherwise report.html in the first folder."""
     notes: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     """A text file whose paragraphs go into the report: what you tried, what worked."""
-    plots_only: bool = False
+    plots_only: Flag = False
     """Only draw the two plots and print the table, which takes a second."""
 
     def __call__(self, console: Console) -> int:

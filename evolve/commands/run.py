@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from evolve.commands.shared import Folder, Whole, evolve_to_the_end
+from evolve.commands.shared import Extras, Folder, Whole, evolve_to_the_end
 from evolve.errors import RunError
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ class Run:
     """Keys of the configuration by their full names, values as in TOML."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="")] = None
     """Folder of the run, otherwise runs/NAME. It must not hold anything yet."""
+    extras: OmitArgPrefixes[Extras] = field(default_factory=Extras)
 
     def __call__(self, console: Console) -> int:
         """Make the folder, and evolve."""
@@ -64,6 +65,7 @@ class Run:
         from evolve.run import create_seeds
         from evolve.toml import load, parse_settings
 
+        _ = self.extras.place  # a bad address is refused before a folder is made
         flags = {
             "seed": self.seed,
             "generations": self.generations,
@@ -82,9 +84,9 @@ class Run:
         if self.seeds < 1:
             raise RunError(f"--seeds must be 1 or more, not {self.seeds}")
         if self.seeds == 1:
-            return evolve_to_the_end([RunFolder.create(config, folder)], console)
+            return evolve_to_the_end([RunFolder.create(config, folder)], console, self.extras)
         runs = create_seeds(config, self.seeds, folder)
-        return evolve_to_the_end(runs, console)
+        return evolve_to_the_end(runs, console, self.extras)
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ class Resume:
     """A new number of generations, to make the run longer."""
     threads: Whole = None
     """Processor cores to use. Changes nothing but the time."""
+    extras: OmitArgPrefixes[Extras] = field(default_factory=Extras)
 
     def __call__(self, console: Console) -> int:
         """Open the folder, and go on."""
@@ -109,4 +112,4 @@ class Resume:
         runs = open_all(self.directory)
         for run in runs:
             run.change(generations=self.generations, threads=self.threads)
-        return evolve_to_the_end(runs, console)
+        return evolve_to_the_end(runs, console, self.extras)

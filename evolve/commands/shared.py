@@ -2,28 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from evolve import run as runs
 
-__all__ = ["INTERRUPTED", "Folder", "Whole", "evolve_to_the_end", "print_written"]
+__all__ = ["INTERRUPTED", "Extras", "Flag", "Folder", "Whole", "evolve_to_the_end", "print_written"]
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
 
 Folder = Annotated[Positional[Path], arg(metavar="DIR")]
+Flag = FlagCreatePairsOff[bool]
 Whole = Annotated[int | None, arg(metavar="N", help_behavior_hint="")]
 
 
-def evolve_to_the_end(together: Sequence[runs.Run], console: Console) -> int:
+@dataclass(frozen=True)
+class Extras:
+    """What a run may do and leave besides."""
+
+    live: Flag = False
+    """Serve a page with the best robot and the curve while the run lasts, to this machine only; its
+    address is printed."""
+    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = "127.0.0.1:0"
+    """Where to serve it; port 0 takes one that is free."""
+    report: Flag = False
+    """Also write report.html at the end, which takes some seconds of filming."""
+    csv: Flag = False
+    """Also write record.csv at the end: every evaluation as a row."""
+
+    @property
+    def place(self) -> tuple[str, int]:
+        """Address and port of the page.
+
+        Raises:
+            ValueError: They are not given as ADDRESS:PORT.
+        """
+        address, _, port = self.live_at.rpartition(":")
+        if not address or not port.isdecimal():
+            raise ValueError(
+                f"--live-at {self.live_at}: expected ADDRESS:PORT, as in 127.0.0.1:8000"
+            )
+        return address.strip("[]"), int(port)
+
+
+def evolve_to_the_end(
+    together: Sequence[runs.Run], console: Console, extras: Extras = Extras()
+) -> int:
     """Evolve runs to their end, or until Ctrl-C, with everything a person wants to see."""
     import warp_springs as ws
     from evolve.fitness import UNITS
@@ -41,13 +75,17 @@ def evolve_to_the_end(together: Sequence[runs.Run], console: Console) -> int:
         console.print(f"[dim]{subject:<8}[/]{words}", highlight=False, soft_wrap=True)
     ws.quiet()
     screen = Screen(console, UNITS[config.task.fitness], len(together))
-    watches = [partial(screen.update, which=i) for i in range(len(together))]
     try:
-        with interruptible() as stopping, screen.showing(stopping):
-            complete = evolve_together(together, watches, stopping.is_set)
+        with ExitStack() as stack:
+            tell = [screen.update, *_live(stack, together, extras, console)]
+            watches = [partial(_tell_all, tell, i) for i in range(len(together))]
+            with interruptible() as stopping, screen.showing(stopping):
+                complete = evolve_together(together, watches, stopping.is_set)
         if complete:
             for run in together:
-                _finish(run, console)
+                _finish(run, console, extras)
+            if extras.report:
+                _report(together, folder, console)
             return 0
     except KeyboardInterrupt:
         pass
@@ -55,7 +93,38 @@ def evolve_to_the_end(together: Sequence[runs.Run], console: Console) -> int:
     return INTERRUPTED
 
 
-def _finish(run: runs.Run, console: Console) -> None:
+def _live(
+    stack: ExitStack, together: Sequence[runs.Run], extras: Extras, console: Console
+) -> list[Callable[..., None]]:
+    """Begin to serve the page, if it is asked for; returns whom to tell of generations."""
+    if not extras.live:
+        return []
+    import warp_springs as ws
+    from evolve.live import Live
+
+    title = f"{together[0].config.name} is evolving"
+    server = stack.enter_context(ws.LiveServer(title, *extras.place))
+    console.print(f"[dim]live    [/]{server.url}", highlight=False, soft_wrap=True)
+    return [Live(together, server).update]
+
+
+def _tell_all(
+    listeners: Sequence[Callable[..., None]], which: int, progress: runs.Progress
+) -> None:
+    for listener in listeners:
+        listener(progress, which)
+
+
+def _report(together: Sequence[runs.Run], folder: Path, console: Console) -> None:
+    """Write the report of a run, or of all its seeds, into its folder."""
+    from evolve.report_page import REPORT, write_report
+
+    with console.status("writing the report") as status:
+        written = write_report(together, folder / REPORT, progress=status.update)
+    print_written(written)
+
+
+def _finish(run: runs.Run, console: Console, extras: Extras) -> None:
     """Crown the champion, write everything, and say what came of the run."""
     from evolve.export import export
     from evolve.report import draw, results, verdict
@@ -67,7 +136,12 @@ def _finish(run: runs.Run, console: Console) -> None:
     with run.read() as store:
         facts = dict(results(store, run.config))
     print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")
-    print_written([run.record_path, *animations, *plots])
+    tables = []
+    if extras.csv:
+        from evolve.tables import write_csv
+
+        tables.append(write_csv(run))
+    print_written([run.record_path, *tables, *animations, *plots])
 
 
 def print_written(paths: Sequence[Path]) -> None:

@@ -1,13 +1,14 @@
-// The two plots of the chosen robot: its energies, and how its centre of mass moves.
+// Plots of a few curves over time: of the chosen robot, or of a run that is going on.
 
 const INK = "#1f2328", GREY = "#8a8d91";
 const LAYERS = { kinetic: "#d9822b", gravity: "#6f9bc8", spring: "#b5495b", ground: "#8a8d91" };
 
 class Plot {
-  // `seek(share)` is told where in time somebody pointed.
+  // `seek(share)`, if any, is told where in time somebody pointed.
   constructor(name, seek) {
     this.canvas = document.getElementById(name);
     this.title = document.getElementById(name + "-title");
+    if (!seek) return;
     const point = (event) => {
       const box = this.canvas.getBoundingClientRect();
       seek(clamp((event.clientX - box.left - PLOT_LEFT) / (box.width - PLOT_LEFT - 6), 0, 1));
@@ -17,8 +18,8 @@ class Plot {
   }
 
   // `series`: {name, color, values, kind: "layer" | "line" | "dashed"}; layers are stacked.
-  show(title, unit, times, series, note = "") {
-    Object.assign(this, { times, series });
+  show(title, unit, times, series, note = "", timeUnit = " s") {
+    Object.assign(this, { times, series, timeUnit });
     const keys = series.map(({ name, color }) => `<span><i style="background:${color}"></i>${escaped(name)}</span>`);
     this.title.innerHTML = `<b>${escaped(title)} [${escaped(unit)}]</b>` + keys.join("") + (note ? `<span>${escaped(note)}</span>` : "");
     const count = times.length;
@@ -52,6 +53,7 @@ class Plot {
     c.setTransform(1, 0, 0, 1, 0, 0);
     c.clearRect(0, 0, canvas.width, canvas.height);
     c.drawImage(this.image, 0, 0);
+    if (share === null) return;
     c.scale(density, density);
     const x = PLOT_LEFT + share * (width - PLOT_LEFT - 6);
     c.strokeStyle = INK;
@@ -77,7 +79,7 @@ class Plot {
     c.textAlign = "center"; c.textBaseline = "top";
     for (const t of ticks(times[0], times[last], 4)) {
       const at = PLOT_LEFT + (t - times[0]) / ((times[last] - times[0]) || 1) * (right - PLOT_LEFT);
-      c.fillText(short(t) + " s", Math.min(at, right - 9), bottom + 4);
+      c.fillText(short(t) + this.timeUnit, Math.min(at, right - 9), bottom + 4);
     }
     for (const one of this.series) {
       c.beginPath();
@@ -116,7 +118,8 @@ function ticks(low, high, count) {
 
 function short(v) {
   if (v === 0) return "0";
-  return Math.abs(v) >= 1e4 || Math.abs(v) < 1e-3 ? v.toExponential(0) : String(Number(v.toPrecision(3)));
+  if (Math.abs(v) >= 1e4 && Math.abs(v) < 1e7) return v.toLocaleString("en");
+  return Math.abs(v) >= 1e7 || Math.abs(v) < 1e-3 ? v.toExponential(0) : String(Number(v.toPrecision(3)));
 }
 
 function escaped(text) {
