@@ -16,7 +16,7 @@ from tests.warp_springs.usd_reading import (
     validation_errors,
     world_extent,
 )
-from warp_springs.io import usd_geometry, usd_layout
+from warp_springs.io import usd_geometry, usd_layout, usd_poses
 from warp_springs.view import appearance
 
 FPS = 30
@@ -511,20 +511,20 @@ def test_rigid_fit_recovers_a_motion(cube):
         for k, (axis, centre) in enumerate(zip(axes, centres, strict=True))
     ]
     frames = np.stack([robot.positions for robot in moved])
-    fitted, rotations = usd_geometry.rigid_fit(rest, frames)
+    fitted, rotations = usd_poses.rigid_fit(rest, frames)
     np.testing.assert_allclose(fitted, centres, atol=1e-12)
     np.testing.assert_allclose(
         rest @ rotations.transpose(0, 2, 1) + centres[:, None], frames, atol=1e-8
     )
     np.testing.assert_allclose(np.linalg.det(rotations), 1.0)
-    for q, rotation in zip(usd_geometry.quaternions(rotations), rotations, strict=True):
+    for q, rotation in zip(usd_poses.quaternions(rotations), rotations, strict=True):
         turned = np.array(Gf.Matrix3d(Gf.Quatd(q[3], *q[:3])))
         np.testing.assert_allclose(turned.T, rotation, atol=1e-12)
 
 
 def test_a_mirrored_body_is_still_turned_and_not_mirrored(cube):
     rest = cube.positions - cube.positions.mean(axis=0)
-    _, rotations = usd_geometry.rigid_fit(rest, (rest * [1.0, 1.0, -1.0])[None])
+    _, rotations = usd_poses.rigid_fit(rest, (rest * [1.0, 1.0, -1.0])[None])
     assert np.linalg.det(rotations[0]) == pytest.approx(1.0)
 
 
@@ -533,9 +533,9 @@ def test_what_a_body_leaves_open_is_not_turned():
     angle = np.linspace(0.0, 3.0, 7)[:, None]
     turned = np.cos(angle) * along + np.sin(angle) * across
     places = np.array([-1.0, 0.0, 1.0])[:, None]
-    _, rotations = usd_geometry.rigid_fit(places * along, places * turned[:, None])
+    _, rotations = usd_poses.rigid_fit(places * along, places * turned[:, None])
     np.testing.assert_allclose(rotations @ along, turned, atol=1e-5)
     axis = np.cross(along, across)
     np.testing.assert_allclose(rotations @ axis, np.tile(axis, (7, 1)), atol=1e-5)
-    _, rotations = usd_geometry.rigid_fit(np.zeros((2, 3)), np.ones((1, 2, 3)))
+    _, rotations = usd_poses.rigid_fit(np.zeros((2, 3)), np.ones((1, 2, 3)))
     np.testing.assert_array_equal(rotations[0], np.eye(3))

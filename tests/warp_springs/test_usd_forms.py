@@ -126,6 +126,51 @@ def test_bodies_without_springs_or_faces(geometry, tmp_path):
     assert len(robots_of(opened(path))) == 2
 
 
+@pytest.fixture(scope="module")
+def swinging():
+    """A rope that is held at one end and falls, and a cube that does not bend."""
+    rope = ws.shapes.chain(links=8, length=1.0, stiffness=2000.0).moved((0.0, 0.0, 1.5)).fixed([0])
+    scene = ws.Scene(ground=None, damping=0.5)
+    return ws.Simulation([rope, ws.shapes.cube()], scene).run(1.0, fps=FPS)
+
+
+def roundness(points, masses, springs, positions):
+    """The least radius of the bars seen along them, in units of their radius.
+
+    Args:
+        points: Of the mesh of bars [m], shape (S * 2 * sides, 3).
+        masses: Which each follows, the same number of rows.
+        springs: Shape (S, 2).
+        positions: Of the masses [m], shape (M, 3).
+    """
+    arms = (points - positions[masses]).reshape(len(springs), -1, 3)
+    along = positions[springs[:, 1]] - positions[springs[:, 0]]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = arms - np.einsum("ski,si->sk", arms, along)[..., None] * along[:, None]
+    return (np.linalg.norm(across, axis=2) / np.linalg.norm(arms, axis=2)).min()
+
+
+@pytest.mark.parametrize("geometry", ["skel", "mesh"])
+def test_bars_stay_round_where_a_body_bends(swinging, geometry, tmp_path):
+    path = ws.export_usd(swinging, tmp_path / "rope.usdc", geometry=geometry, grid=False)
+    assert validation_errors(path) == []
+    stage = opened(path)
+    springs = swinging.robots[0].springs
+    masses = np.repeat(springs.ravel(), 9)
+    for frame in range(0, len(swinging.times), 3):
+        if geometry == "skel":
+            points, joints = skinned(stage, robots_of(stage)[0], frame)["bars"]
+            np.testing.assert_array_equal(joints, masses)
+        else:
+            points = world_points(form(robots_of(stage)[0], "bars"), frame)
+        positions = swinging.frames(0)[frame]
+        assert roundness(points, masses, springs, positions) > 0.6, frame
+    if geometry == "skel":  # and who does not bend does not pay for it
+        motions = [p for p in stage.Traverse() if p.GetTypeName() == "SkelAnimation"]
+        turning = [p.GetAttribute("rotations").GetNumTimeSamples() for p in motions]
+        assert turning == [len(swinging.times), 0]
+
+
 # -- colours by material -----------------------------------------------------------------------
 
 

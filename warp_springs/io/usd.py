@@ -25,6 +25,7 @@ from warp_springs.io.usd_layout import (
     unique_names,
 )
 from warp_springs.io.usd_notes import facts, provenance, usd_dict
+from warp_springs.io.usd_poses import bends
 from warp_springs.surfaces import Plane
 from warp_springs.view import appearance
 from warp_springs.view.solids import obstacle_mesh
@@ -52,8 +53,8 @@ _BLOCK_BYTES = 16_000_000
 """Samples held in memory between two saves."""
 _SCALE_FRAMES = 64
 _SCALE_SPRINGS = 1_000_000
-"""Frames, spread over the animation, that decide what tension takes the full colour: so many, or
-fewer where they would have more springs than that in all."""
+"""Frames, spread over the animation, that decide what tension takes the full colour and whether a
+robot bends: so many, or fewer where they would have more springs than that in all."""
 
 
 class _Drawn(NamedTuple):
@@ -218,9 +219,11 @@ def _write_motion(
 
     item, frames = each.item, np.asarray(result.frames(each.item.index))
     radii = (item.bar, item.ball)
-    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail)
     most = max(1, min(_SCALE_FRAMES, _SCALE_SPRINGS // max(each.robot.n_springs, 1)))
-    scale = appearance.stress_scale(_tension(each, frames, _spread(len(frames), most)))
+    sample = _spread(len(frames), most)
+    scale = appearance.stress_scale(_tension(each, frames, sample))
+    bent = each.geometry != "points" and _bends(each.robot, frames[item.source[sample]])
+    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail, bent)
     add_pushes(
         xform.GetPrim().GetStage(), looks, item, frames, each.offset, xform.GetPrim().GetName()
     )
@@ -332,6 +335,12 @@ def _check_keys(name: str, given: Mapping[int, Any] | None, indices: list[int]) 
     for index in given or ():
         if index not in indices:
             raise ValueError(f"{name}: got robot {index!r}, which is not among those exported")
+
+
+def _bends(robot: Robot, frames: np.ndarray) -> bool:
+    """Whether a robot bends so far that its bars would not stay round by themselves."""
+    rest = robot.positions - robot.positions.mean(axis=0)
+    return bends(rest, robot.springs, frames)
 
 
 def _spread(count: int, most: int) -> np.ndarray:

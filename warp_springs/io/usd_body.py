@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 # Only the exporter imports this module, when it has something to write.
 from pxr import Sdf, Usd, UsdGeom, Vt  # noqa: TID253
 
-from warp_springs.io.usd_geometry import Detail, quaternions, rigid_fit
+from warp_springs.io.usd_geometry import Detail
 from warp_springs.io.usd_layout import Paint
+from warp_springs.io.usd_poses import quaternions, rigid_fit
 from warp_springs.io.usd_stage import Looks, vec3f
 from warp_springs.robot import Robot
 
@@ -37,6 +38,7 @@ class Body(ABC):
         looks: The materials of the stage.
         radii: Of the bars and of the balls [m].
         detail: How finely they are meshed.
+        bent: Whether its masses turn on their own, so that bars stay round where it bends.
     """
 
     def __init__(
@@ -47,13 +49,14 @@ class Body(ABC):
         looks: Looks,
         radii: tuple[float, float],
         detail: Detail,
+        bent: bool,
     ) -> None:
         self._path = xform.GetPath()
         self._stage: Usd.Stage = xform.GetPrim().GetStage()
         self._robot, self._paint, self._looks = robot, paint, looks
         self._rest = robot.positions - robot.positions.mean(axis=0)
         self._bar, self._ball = radii
-        self._detail = detail
+        self._detail, self._bent = detail, bent
         self._reach = 1.001 * max(self._bar, self._ball)
         self._turned: FloatArray | None = None
         self._boxes: list[FloatArray] = []
@@ -72,7 +75,7 @@ class Body(ABC):
         """Define the prims in the rest pose; set ``_colors`` to the indices of colours, if any."""
 
     @abstractmethod
-    def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
+    def _write_shape(self, first: int, local: FloatArray) -> None:
         """Write frames of masses in the robot's own frame [m], shape (F, M, 3)."""
 
     @abstractmethod
@@ -98,7 +101,7 @@ class Body(ABC):
         low, high = local.min(axis=1) - self._reach, local.max(axis=1) + self._reach
         self._boxes.append(np.stack([low, high], axis=1))
         self._write_moves(first, centres, turns)
-        self._write_shape(first, local.astype(np.float32))
+        self._write_shape(first, local)
         if colors is not None and self._colors is not None:
             self._write_colors(first, colors)
 

@@ -173,48 +173,6 @@ def checker(half_tiles: int, tile: float) -> tuple[Part, NDArray[np.bool_]]:
     return Part(points, quads.astype(np.int32)), (i + j) % 2 == 1
 
 
-def rigid_fit(rest: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centres (F, 3) and rotations (F, 3, 3) that carry a body's rest shape nearest to its frames.
-
-    Kabsch 1976 (doi:10.1107/S0567739476001873), all frames at once. ``rest`` has shape (M, 3) and
-    zero mean, ``frames`` (F, M, 3). A body that leaves the rotation open (a point, a line) takes
-    the smallest one.
-    """
-    centres = frames.mean(axis=1)
-    covariance = np.einsum("fmi,mj->fij", frames - centres[:, None], rest)
-    spread = np.linalg.norm(covariance, axis=(1, 2))
-    # A trace of the identity decides what the body leaves open, and is below its own noise.
-    covariance += np.where(spread > 0.0, 1e-9 * spread, 1.0)[:, None, None] * np.eye(3)
-    left, _, right = np.linalg.svd(covariance)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return centres, left @ right
-
-
-def quaternions(rotations: FloatArray, before: FloatArray | None = None) -> FloatArray:
-    """Unit quaternions (x, y, z, w), shape (F, 4), of rotations (F, 3, 3).
-
-    Each has the sign nearer to the one before it, and the first to ``before`` (4,), so that a
-    viewer that interpolates turns the short way. Shepperd 1978 (doi:10.2514/3.55767b).
-    """
-    r = rotations
-    diagonal = np.diagonal(r, axis1=1, axis2=2)
-    trace = diagonal.sum(axis=1)
-    # Row k of the symmetric matrix 4 q q^T for q = (x, y, z, w); the largest diagonal is safest.
-    outer = np.empty((len(r), 4, 4))
-    outer[:, :3, :3] = r + r.transpose(0, 2, 1)
-    for axis in range(3):
-        outer[:, axis, axis] = 1.0 + 2.0 * diagonal[:, axis] - trace
-        j, k = (axis + 1) % 3, (axis + 2) % 3
-        outer[:, axis, 3] = outer[:, 3, axis] = r[:, k, j] - r[:, j, k]
-    outer[:, 3, 3] = 1.0 + trace
-    best = np.diagonal(outer, axis1=1, axis2=2).argmax(axis=1)
-    q = outer[np.arange(len(r)), best]
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    earlier = np.concatenate([q[:1] if before is None else before[None], q[:-1]])
-    turns = np.where(np.einsum("fi,fi->f", q, earlier) < 0.0, -1.0, 1.0)
-    return q * np.cumprod(turns)[:, None]
-
-
 @cache
 def _unit_ball(cuts: int) -> tuple[FloatArray, IntArray]:
     """A cube with every face cut in ``cuts`` squared, an even number, and blown up.

@@ -10,14 +10,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 # Only the exporter imports this module, when it has something to write.
-from pxr import Sdf, Usd, UsdGeom, UsdShade, Vt  # noqa: TID253
+from pxr import Sdf, Usd, UsdGeom, UsdShade  # noqa: TID253
 
-from warp_springs.io.usd_body import Body, IntArray
+from warp_springs.io.usd_body import Body, FloatArray, IntArray
 from warp_springs.io.usd_geometry import Part, balls, skin, tubes
-from warp_springs.io.usd_stage import add_subsets, bind, constant_color, define_mesh
+from warp_springs.io.usd_poses import mass_turns
+from warp_springs.io.usd_stage import add_subsets, bind, constant_color, define_mesh, vec3f
 from warp_springs.view import appearance
 
 _POINT_BYTES = 12
@@ -77,6 +77,9 @@ class MeshBody(Meshes):
 
     def _build(self) -> None:
         self._meshes = list(self._add_meshes(self._path))
+        for mesh, _ in self._meshes if self._bent else ():
+            mesh.GetPrim().RemoveProperty("primvars:normals")  # they hold for what does not turn
+            mesh.GetPrim().RemoveProperty("primvars:normals:indices")
 
     @property
     def bytes_a_frame(self) -> int:
@@ -84,13 +87,16 @@ class MeshBody(Meshes):
         points = sum(len(part.points) for _, part in self._meshes)
         return _POINT_BYTES * points + 4 * self._detail.sides * self._robot.n_springs + 100
 
-    def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
+    def _write_shape(self, first: int, local: FloatArray) -> None:
+        turns = mass_turns(self._rest, self._robot.springs, local) if self._bent else None
         for mesh, part in self._meshes:
-            offsets = (part.points - self._rest[part.masses]).astype(np.float32)
+            offsets = part.points - self._rest[part.masses]
             points = mesh.GetPointsAttr()
-            for time, masses in enumerate(local, start=first):
-                moved = masses[part.masses] + offsets
-                points.Set(Vt.Vec3fArray.FromNumpy(moved), time)
+            for frame, masses in enumerate(local):
+                turned = offsets
+                if turns is not None:
+                    turned = np.einsum("vij,vj->vi", turns[frame][part.masses], offsets)
+                points.Set(vec3f(masses[part.masses] + turned), first + frame)
 
     def _extents(self) -> list[Usd.Attribute]:
         return [mesh.GetExtentAttr() for mesh, _ in self._meshes]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 # Only the exporter imports this module, when it has something to write.
 from pxr import Usd, UsdGeom, Vt  # noqa: TID253
 
-from warp_springs.io.usd_body import Body
+from warp_springs.io.usd_body import Body, FloatArray
 from warp_springs.io.usd_geometry import Part
 from warp_springs.io.usd_stage import bind, constant_color, define_mesh, ints, vec3f
 from warp_springs.view import appearance
@@ -47,7 +47,8 @@ class PointsBody(Body):
         """Memory of the samples of one frame."""
         return 12 * sum(len(of) for _, of in self._forms) + 4 * self._robot.n_springs + 100
 
-    def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
+    def _write_shape(self, first: int, local: FloatArray) -> None:
+        local = local.astype(np.float32)
         for form, masses in self._forms:
             points = form.GetPointsAttr()
             for time, frame in enumerate(local, start=first):

@@ -7,12 +7,13 @@ index for each face of a bar, however fine the meshes are.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 # Only the exporter imports this module, when it has something to write.
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt  # noqa: TID253
 
+from warp_springs.io.usd_body import FloatArray
 from warp_springs.io.usd_mesh import Meshes
+from warp_springs.io.usd_poses import mass_turns, quaternions
 from warp_springs.io.usd_stage import ints, vec3f
 
 
@@ -20,6 +21,7 @@ class SkelBody(Meshes):
     """A robot as a skeleton and meshes bound to it."""
 
     def _build(self) -> None:
+        self._joints_turned: FloatArray | None = None
         self._root = UsdSkel.Root.Define(self._stage, self._child(self._path, "body"))
         self._root.CreateExtentAttr(self._rest_extent())
         skeleton, self._motion = self._add_skeleton()
@@ -34,12 +36,21 @@ class SkelBody(Meshes):
     @property
     def bytes_a_frame(self) -> int:
         """Memory of the samples of one frame."""
-        return 12 * len(self._rest) + 4 * self._detail.sides * self._robot.n_springs + 100
+        joint = 28 if self._bent else 12
+        return joint * len(self._rest) + 4 * self._detail.sides * self._robot.n_springs + 100
 
-    def _write_shape(self, first: int, local: NDArray[np.float32]) -> None:
+    def _write_shape(self, first: int, local: FloatArray) -> None:
         translations = self._motion.GetTranslationsAttr()
-        for time, joints in enumerate(local, start=first):
+        for time, joints in enumerate(local.astype(np.float32), start=first):
             translations.Set(Vt.Vec3fArray.FromNumpy(joints), time)
+        if not self._bent:
+            return
+        turns = mass_turns(self._rest, self._robot.springs, local)
+        turns = quaternions(turns, self._joints_turned)
+        self._joints_turned = turns[-1]
+        rotations = self._motion.GetRotationsAttr()
+        for time, joints in enumerate(turns.astype(np.float32), start=first):
+            rotations.Set(Vt.QuatfArray.FromNumpy(joints), time)
 
     def _extents(self) -> list[Usd.Attribute]:
         return [self._root.GetExtentAttr()]
