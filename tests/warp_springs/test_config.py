@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from warp_springs.config import ConfigError, SceneFile, dump, load_scene, parse, parse_settings
+from warp_springs.config import (
+    ConfigError,
+    SceneFile,
+    dump,
+    load_scene,
+    parse,
+    parse_settings,
+    reference,
+)
 
 MINIMAL = """
 name = "drop"
@@ -293,3 +301,24 @@ def test_settings_are_read_as_toml():
     }
     with pytest.raises(ConfigError, match="--set takes KEY=VALUE"):
         parse_settings(["a"])
+
+
+def test_the_reference_explains_every_key():
+    lines = reference(SceneFile).splitlines()
+    keys = [line for line in lines if " = " in line or line.endswith(" =")]
+    assert len(keys) > 100
+    bare = [line for line in keys if "#" not in line]
+    assert all(line.startswith(("shape", "type")) for line in bare), bare
+    headings = [line for line in lines if line.startswith("[")]
+    for table in ("[robot.body]", "[[robot.materials]]", "[scene.ground]", "[record]"):
+        assert table in headings
+    assert headings.count("[robot.body]") == 11
+
+
+def test_the_command_prints_the_reference(capsys):
+    from rich.console import Console
+
+    from warp_springs.commands.run import RunCommand
+
+    assert RunCommand(keys=True).run(Console()) == 0
+    assert capsys.readouterr().out == reference(SceneFile)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,23 +25,33 @@ class RunCommand:
     with 3 if a robot had to be stopped.
 
     Begin with a copy of a demonstration: warp-springs demo bouncing-cube --toml > scene.toml
+    All keys: warp-springs run --keys
 
     Any key can be set, for example
     warp-springs run scene.toml --set robot.body.edge=0.2 scene.damping=1 record.fps=30
     """
 
-    scene: Annotated[Positional[Path], arg(metavar="SCENE.toml")]
+    scene: Annotated[Positional[Path | None], arg(metavar="SCENE.toml")] = None
     """The scene."""
     out: Path = Path("out")
     """Folder to write to; made if it is missing."""
     set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()
     """Keys of the scene by their full names, values as in TOML."""
 
+    keys: bool = False
+    """Print all keys with their defaults and what they mean instead."""
+
     def run(self, console: Console) -> int:
         """Simulate, write, and say what was written."""
         from warp_springs.commands.scenes import simulated, write_and_say
-        from warp_springs.config import load_scene, parse_settings
+        from warp_springs.config import SceneFile, load_scene, parse_settings, reference
 
+        if self.keys:
+            print(reference(SceneFile), end="")
+            return 0
+        if self.scene is None:
+            print("warp-springs run: SCENE.toml is missing; --help explains", file=sys.stderr)
+            return 2
         config = load_scene(self.scene, parse_settings(self.set))
         result = simulated(config, console)
         write_and_say(config, result, self.out, console)

@@ -6,6 +6,7 @@ that names the file and the key.
 
 from warp_springs.config.bodies import SHAPES, AnyBody, AnyShape, BodyConfig
 from warp_springs.config.files import MOST_SHOWN, OUTPUTS, RecordConfig, SceneFile, load_scene
+from warp_springs.config.reference import reference
 from warp_springs.config.robots import RobotConfig
 from warp_springs.config.scenes import GroundConfig, SceneConfig
 from warp_springs.config.section import Section, Triple, one_of
@@ -43,6 +44,7 @@ __all__ = [
     "parse",
     "parse_settings",
     "read_text",
+    "reference",
     "suggest",
     "tables",
     "validate",

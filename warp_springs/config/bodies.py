@@ -61,8 +61,11 @@ class Lattice(BodyConfig):
 
     shape: Literal["lattice"]
     nx: int = Field(ge=1)
+    """Voxels along x."""
     ny: int = Field(ge=1)
+    """Voxels along y."""
     nz: int = Field(ge=1)
+    """Voxels along z."""
     edge: float = Field(0.1, gt=0.0)
     """Length of a voxel's edge [m]."""
     mass_per_vertex: float = Field(0.1, gt=0.0)
@@ -78,6 +81,7 @@ class Voxels(BodyConfig):
 
     shape: Literal["voxels"]
     layers: tuple[tuple[str | tuple[int, ...], ...], ...]
+    """For example [["#.#"], ["###"]]."""
     edge: float = Field(0.1, gt=0.0)
     """Length of a voxel's edge [m]."""
     mass_per_vertex: float = Field(0.1, gt=0.0)
@@ -116,9 +120,11 @@ class Beam(BodyConfig):
 
     shape: Literal["beam"]
     length: float = Field(1.0, gt=0.0)
+    """Along x [m]."""
     width: float = Field(0.1, gt=0.0)
+    """Along y [m]."""
     height: float = Field(0.1, gt=0.0)
-    """[m]"""
+    """Along z [m]."""
     cells: tuple[int, int, int] = (10, 1, 1)
     """Along x, y and z."""
     mass: float = Field(1.0, gt=0.0)
@@ -130,6 +136,7 @@ class Chain(BodyConfig):
 
     shape: Literal["chain"]
     links: int = Field(10, ge=1)
+    """Number of springs."""
     length: float = Field(1.0, gt=0.0)
     """Of the whole chain [m]."""
     mass: float = Field(1.0, gt=0.0)
@@ -157,6 +164,7 @@ class RandomLattice(BodyConfig):
     spacing: float = Field(gt=0.0)
     """Least distance of two masses [m]."""
     seed: int = Field(0, ge=0)
+    """From which the places follow."""
     reach: float = Field(2.3, ge=1.0)
     """Longest spring [spacings]."""
     n_springs: int | None = Field(None, ge=1)

@@ -24,6 +24,7 @@ class Springs(Section):
     """Which springs: all, unless indices or a box around their middles are given."""
 
     springs: tuple[int, ...] | None = None
+    """Indices."""
     box: Box | None = None
     """Lowest and highest corner, in the body's own coordinates [m]."""
 
@@ -44,6 +45,7 @@ class Masses(Section):
     """Which masses: all, unless indices or a box are given."""
 
     masses: tuple[int, ...] | None = None
+    """Indices."""
     box: Box | None = None
     """Lowest and highest corner, in the body's own coordinates [m]."""
 
@@ -64,6 +66,7 @@ class MaterialConfig(Springs):
     """A material of some springs: one that exists, changed on request, or a new one."""
 
     name: str
+    """bone, tissue, muscle, muscle2, nylon, or any other with a stiffness or a modulus."""
     stiffness: float | None = Field(None, gt=0.0)
     """[N/m]"""
     modulus: float | None = Field(None, gt=0.0)
@@ -161,6 +164,7 @@ class FixedConfig(Masses):
     """Masses that keep some of their coordinates."""
 
     axes: str = Field("xyz", pattern="^[xyz]+$")
+    """Which coordinates."""
 
 
 class TetherConfig(Masses):
@@ -171,7 +175,9 @@ class TetherConfig(Masses):
     point: Triple | None = None
     """In the body's own coordinates [m]; where each mass is when left out."""
     rest_length: float = Field(0.0, ge=0.0)
+    """[m]"""
     start: float = Field(0.0, ge=0.0)
+    """[s]"""
     end: float | None = Field(None, gt=0.0)
     """[s]; never when left out."""
 
@@ -190,7 +196,9 @@ class ToPlane(HeldConfig):
 
     type: Literal["plane"]
     normal: Triple
+    """Of any length."""
     offset: float = 0.0
+    """[m]"""
 
 
 class ToLine(HeldConfig):
@@ -198,7 +206,9 @@ class ToLine(HeldConfig):
 
     type: Literal["line"]
     point: Triple
+    """[m]"""
     direction: Triple
+    """Of any length."""
 
 
 class ToCircle(HeldConfig):
@@ -206,8 +216,11 @@ class ToCircle(HeldConfig):
 
     type: Literal["circle"]
     center: Triple
+    """[m]"""
     normal: Triple
+    """Of any length."""
     radius: float = Field(gt=0.0)
+    """[m]"""
 
 
 class ToSphere(HeldConfig):
@@ -215,7 +228,9 @@ class ToSphere(HeldConfig):
 
     type: Literal["sphere"]
     center: Triple
+    """[m]"""
     radius: float = Field(gt=0.0)
+    """[m]"""
 
 
 class ShoeConfig(Masses):
@@ -238,6 +253,7 @@ class RotationConfig(Section):
     """A turn about an axis, before the body goes to its position."""
 
     axis: Triple = (0.0, 0.0, 1.0)
+    """Of any length."""
     angle: float
     """[rad]"""
     about: Triple | None = None
@@ -248,6 +264,7 @@ class RobotConfig(Section):
     """A robot, or several copies of it."""
 
     name: str | None = None
+    """What it is called; after its shape when left out."""
     body: AnyBody
     scale: float = Field(1.0, gt=0.0)
     """Of all lengths of the body."""
@@ -260,7 +277,7 @@ class RobotConfig(Section):
     actuation: tuple[ActuationConfig, ...] = ()
     """A list of tables applied in this order, or one table."""
     cables: Springs | None = None
-    """Springs that only pull."""
+    """Springs that only pull: {} for all."""
     dashpots: tuple[DashpotConfig, ...] = ()
     fixed: tuple[FixedConfig, ...] = ()
     held: tuple[one_of((ToPlane, ToLine, ToCircle, ToSphere), "type"), ...] = ()
@@ -277,6 +294,7 @@ class RobotConfig(Section):
     spin: Triple = (0.0, 0.0, 0.0)
     """Angular velocity about the centre of mass [rad/s]."""
     copies: int = Field(1, ge=1)
+    """How many."""
     orientation: Literal["same", "random"] = "same"
     """Whether each copy is turned at random, all directions alike."""
     seed: int = Field(0, ge=0)

@@ -15,20 +15,21 @@ __all__ = ["GroundConfig", "SceneConfig"]
 
 
 class Surface(Section):
-    """An elastic surface with friction: rubber on concrete unless told.
-
-    ``material``, a pair of surfaces such as ["ice", "ice"], stands for both coefficients.
-    """
+    """An elastic surface with friction."""
 
     stiffness: float = Field(1e5, gt=0.0)
     """[N/m]"""
+    material: tuple[str, str] | None = Field(None, exclude=True)
+    """Two surfaces of ws.materials.FRICTION such as ["ice", "ice"], instead of coefficients."""
     static_friction: float = Field(1.0, ge=0.0)
+    """Coefficient below which a mass sticks; the default is rubber on concrete."""
     kinetic_friction: float = Field(0.8, ge=0.0)
+    """Coefficient with which a mass slides."""
 
     @model_validator(mode="before")
     @classmethod
     def _coefficients_of_materials(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping) or "material" not in data:
+        if not isinstance(data, Mapping) or data.get("material") is None:
             return data
         data = dict(data)
         surfaces = data.pop("material")
@@ -45,6 +46,7 @@ class GroundConfig(Surface):
     """The plane z = 0."""
 
     friction: Literal["coulomb", "course"] = "coulomb"
+    """The law: impulses against velocity, or the classroom's force against normal force."""
 
     def build(self) -> scene.Ground:
         """Make the ground."""
@@ -65,6 +67,7 @@ class PlaneConfig(Obstacle):
 
     type: Literal["plane"]
     normal: Triple = (0.0, 0.0, 1.0)
+    """Outward, of any length."""
     offset: float = 0.0
     """Of normal . p = offset [m]."""
 
@@ -74,7 +77,9 @@ class SphereConfig(Obstacle):
 
     type: Literal["sphere"]
     center: Triple
+    """[m]"""
     radius: float = Field(gt=0.0)
+    """[m]"""
 
 
 class BoxConfig(Obstacle):
@@ -82,8 +87,11 @@ class BoxConfig(Obstacle):
 
     type: Literal["box"]
     center: Triple
+    """[m]"""
     size: Triple
+    """[m]"""
     axis: Triple = (0.0, 0.0, 1.0)
+    """Of the turn."""
     angle: float = 0.0
     """[rad]"""
 
@@ -99,8 +107,9 @@ class HeightFieldConfig(Obstacle):
     picture: BesideFile | None = None
     """A file, relative to that of the configuration."""
     lowest: float = 0.0
+    """Height of black [m]."""
     highest: float = 0.1
-    """Heights of black and of white [m]."""
+    """Height of white [m]."""
     origin: Triple = (0.0, 0.0, 0.0)
     """Where the first grid point is, and what is added to all heights [m]."""
 
@@ -140,7 +149,9 @@ class CollisionsConfig(Section):
     stiffness: float = Field(1e4, gt=0.0)
     """[N/m]"""
     static_friction: float = Field(1.0, ge=0.0)
+    """Coefficient below which two surfaces do not slide."""
     kinetic_friction: float = Field(0.8, ge=0.0)
+    """Coefficient with which they slide."""
     damping: float = Field(0.1, ge=0.0)
     """As a part of critical damping."""
     within: bool = True

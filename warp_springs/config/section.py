@@ -25,7 +25,9 @@ BesideFile = Annotated[Path, AfterValidator(_beside)]
 class Section(BaseModel):
     """A table of a configuration: unchangeable, and unknown keys are refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 def one_of(models: Iterable[type[Section]], key: str) -> Any:

@@ -17,10 +17,13 @@ class SimulationConfig(Section):
     dt: float | Literal["auto"] = "auto"
     """Time step [s], or "auto": for each robot half a millisecond, halved until it is stable."""
     precision: Literal["float64", "float32", "mixed"] = "float64"
+    """Of the arithmetic; mixed keeps positions as sums of two."""
     integrator: Literal["chin4", "leapfrog", "euler"] = "chin4"
+    """Fourth order, second order, or the classroom's."""
     layout: Literal["auto", "lanes", "block", "flat"] = "auto"
     """How robots are laid out for the processor."""
     device: str = "cpu"
+    """Where it is computed."""
     threads: int | None = Field(None, ge=1)
     """Processor cores to use, all when left out. The results do not depend on it."""
 

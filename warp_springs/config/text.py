@@ -19,6 +19,7 @@ else:
 __all__ = [
     "ConfigError",
     "dump",
+    "in_toml",
     "parse",
     "parse_settings",
     "read_text",
@@ -158,7 +159,7 @@ def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
     # What a section is comes before what it is told.
     for key, value in sorted(table.items(), key=lambda item: item[0] not in _KINDS):
         if not isinstance(value, Mapping):
-            yield f"{_key(key)} = {_value(value)}"
+            yield f"{_key(key)} = {in_toml(value)}"
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from _lines(value, (*path, _key(key)))
@@ -166,17 +167,17 @@ def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
 
 def _key(key: str) -> str:
     bare = key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key)
-    return key if bare else _value(key)
+    return key if bare else in_toml(key)
 
 
-def _value(value: Any) -> str:
+def in_toml(value: Any) -> str:
     """A value in TOML. Strings need JSON's escapes and one more."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_value, value))}]"
+        return f"[{', '.join(map(in_toml, value))}]"
     if isinstance(value, Mapping):
-        inner = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
+        inner = ", ".join(f"{_key(key)} = {in_toml(item)}" for key, item in value.items())
         return f"{{{inner}}}"
     return repr(value).lower() if isinstance(value, bool) else repr(value)
 
