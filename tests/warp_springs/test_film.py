@@ -13,7 +13,7 @@ import warp_springs as ws
 from warp_springs.view import appearance, video
 from warp_springs.view.actors import actors_of, between
 from warp_springs.view.camera import Camera
-from warp_springs.view.directing import Director
+from warp_springs.view.directing import Director, Setting
 from warp_springs.view.film import Film
 from warp_springs.view.look import Cut, Look
 from warp_springs.view.picture import picture
@@ -121,7 +121,7 @@ def director(result, **options):
     cut = Cut(**{k: v for k, v in options.items() if k in ("follow", "turns")})
     look = Look(camera=options.get("camera"))
     actors = actors_of(result, [0], look, None, film=True)
-    return actors[0], Director(actors, result.times, SIZE, look, cut, result.scene)
+    return actors[0], Director(actors, Setting(result.times, result.scene, look, cut), SIZE)
 
 
 @pytest.mark.parametrize("camera", [None, Camera(eye=(2.0, -2.0, 1.0))])

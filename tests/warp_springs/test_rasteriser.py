@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warp_springs.kernels import raster
+from warp_springs.kernels import raster, shading
 from warp_springs.view.camera import Camera
 from warp_springs.view.rasteriser import TO_SUN, Drawing, draw
 
@@ -226,3 +226,10 @@ def test_shadow_is_softer_under_a_higher_object():
         assert light.min() < 0.7
         widths.append(np.count_nonzero((light > 0.7) & (light < 0.98)))
     assert widths[1] > 1.5 * widths[0] > 0
+
+
+def test_the_kernels_compile_for_cuda(tmp_path):
+    for module in (raster, shading):  # without a GPU, ahead of time
+        wp.compile_aot_module(module, arch=[80], module_dir=str(tmp_path))
+    binaries = sorted(path.name for path in tmp_path.glob("*.cubin"))
+    assert len(binaries) == 2 and "raster" in binaries[0] and "shading" in binaries[1]

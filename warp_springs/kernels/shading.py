@@ -37,6 +37,8 @@ class Sun:
     spread: float  # half the blur's width per length from the hiding to the hidden point
     reach: int  # half the blur's greatest width; the map's rim, left empty, is wider [texels]
     floor: wp.vec3  # depth of the floor [m]: [0] + [1] column + [2] row
+    depths: wp.array(dtype=wp.uint64)  # the map: keys, row by row
+    sums: wp.array2d(dtype=wp.vec2i)  # over all texels above and to the left; see sum_rows
 
 
 @wp.struct
@@ -83,7 +85,6 @@ def depth_of(key: wp.uint64):
 @wp.kernel
 def sum_rows(
     sun: Sun,
-    depths: wp.array(dtype=wp.uint64),
     # outputs
     sums: wp.array2d(dtype=wp.vec2i),  # (size + 1, size + 1), its first row and column zero
 ):
@@ -95,7 +96,7 @@ def sum_rows(
     covered = wp.int32(0)
     way = wp.int32(0)
     for x in range(sun.size):
-        key = depths[y * sun.size + x]
+        key = sun.depths[y * sun.size + x]
         if key != EMPTY:
             floor = sun.floor[0] + sun.floor[1] * (float(x) + 0.5) + sun.floor[2] * (float(y) + 0.5)
             gap = (floor - depth_of(key)) * sun.scale
@@ -130,7 +131,7 @@ def covered_before(sums: wp.array2d(dtype=wp.vec2i), base: int, x: float, y: flo
 
 
 @wp.func
-def shadow_on_floor(sun: Sun, sums: wp.array2d(dtype=wp.vec2i), p: wp.vec3):
+def shadow_on_floor(sun: Sun, p: wp.vec3):
     """Share of the sun that is hidden from a point of the floor, 0 ... 1."""
     q = sun.turn * p + sun.shift
     x = sun.center + q[0] * sun.scale
@@ -142,22 +143,27 @@ def shadow_on_floor(sun: Sun, sums: wp.array2d(dtype=wp.vec2i), p: wp.vec3):
     x0 = int(x) - sun.reach
     y0 = int(y) - sun.reach
     edge = 2 * sun.reach + 1
-    near = sums[y0 + edge, x0 + edge] - sums[y0, x0 + edge] - sums[y0 + edge, x0] + sums[y0, x0]
+    near = (
+        sun.sums[y0 + edge, x0 + edge]
+        - sun.sums[y0, x0 + edge]
+        - sun.sums[y0 + edge, x0]
+        + sun.sums[y0, x0]
+    )
     if near[0] == 0:
         return 0.0
     if near[0] == edge * edge:
         return 1.0
     blur = wp.clamp(float(near[1]) / float(near[0]) * sun.spread, 0.75, float(sun.reach))
-    base = sums[int(y), int(x)][0]
-    hidden = covered_before(sums, base, x + blur, y + blur)
-    hidden -= covered_before(sums, base, x - blur, y + blur)
-    hidden -= covered_before(sums, base, x + blur, y - blur)
-    hidden += covered_before(sums, base, x - blur, y - blur)
+    base = sun.sums[int(y), int(x)][0]
+    hidden = covered_before(sun.sums, base, x + blur, y + blur)
+    hidden -= covered_before(sun.sums, base, x - blur, y + blur)
+    hidden -= covered_before(sun.sums, base, x + blur, y - blur)
+    hidden += covered_before(sun.sums, base, x - blur, y - blur)
     return hidden / (4.0 * blur * blur)
 
 
 @wp.func
-def hidden_at(sun: Sun, depths: wp.array(dtype=wp.uint64), x: float, y: float, z: float):
+def hidden_at(sun: Sun, x: float, y: float, z: float):
     """Share of the four texels nearest to a place of the map that hide depth z, bilinear."""
     x0 = int(wp.floor(x - 0.5))
     y0 = int(wp.floor(y - 0.5))
@@ -166,17 +172,16 @@ def hidden_at(sun: Sun, depths: wp.array(dtype=wp.uint64), x: float, y: float, z
     fx = x - 0.5 - float(x0)
     fy = y - 0.5 - float(y0)
     k = y0 * sun.size + x0
-    upper = wp.where(depth_of(depths[k]) < z, 1.0 - fx, 0.0)
-    upper += wp.where(depth_of(depths[k + 1]) < z, fx, 0.0)
-    lower = wp.where(depth_of(depths[k + sun.size]) < z, 1.0 - fx, 0.0)
-    lower += wp.where(depth_of(depths[k + sun.size + 1]) < z, fx, 0.0)
+    upper = wp.where(depth_of(sun.depths[k]) < z, 1.0 - fx, 0.0)
+    upper += wp.where(depth_of(sun.depths[k + 1]) < z, fx, 0.0)
+    lower = wp.where(depth_of(sun.depths[k + sun.size]) < z, 1.0 - fx, 0.0)
+    lower += wp.where(depth_of(sun.depths[k + sun.size + 1]) < z, fx, 0.0)
     return upper * (1.0 - fy) + lower * fy
 
 
 @wp.func
 def shadow_on_surface(
     sun: Sun,
-    depths: wp.array(dtype=wp.uint64),
     p: wp.vec3,
     normal: wp.vec3,
 ):
@@ -186,10 +191,10 @@ def shadow_on_surface(
     x = sun.center + q[0] * sun.scale
     y = sun.center + q[1] * sun.scale
     z = q[2] - texel
-    hidden = hidden_at(sun, depths, x - 1.0, y - 1.0, z)
-    hidden += hidden_at(sun, depths, x + 1.0, y - 1.0, z)
-    hidden += hidden_at(sun, depths, x - 1.0, y + 1.0, z)
-    hidden += hidden_at(sun, depths, x + 1.0, y + 1.0, z)
+    hidden = hidden_at(sun, x - 1.0, y - 1.0, z)
+    hidden += hidden_at(sun, x + 1.0, y - 1.0, z)
+    hidden += hidden_at(sun, x - 1.0, y + 1.0, z)
+    hidden += hidden_at(sun, x + 1.0, y + 1.0, z)
     return 0.25 * hidden
 
 
@@ -235,9 +240,7 @@ def through_water(floor: Floor, sun: Sun, d: wp.vec3, depth: float, color: wp.ve
 
 
 @wp.func
-def background(
-    lens: Lens, sun: Sun, floor: Floor, sums: wp.array2d(dtype=wp.vec2i), d: wp.vec3, t: float
-):
+def background(lens: Lens, sun: Sun, floor: Floor, d: wp.vec3, t: float):
     """Colour of floor or sky along the ray t d; the checker is averaged over a pixel."""
     length = wp.length(d)
     rise = wp.dot(sun.up, d)
@@ -255,7 +258,7 @@ def background(
     wave_x = square_wave(floor.eye_x + wp.dot(floor.axis_x, p), wp.max(wide_x, 1.0e-3))
     wave_y = square_wave(floor.eye_y + wp.dot(floor.axis_y, p), wp.max(wide_y, 1.0e-3))
     color = wp.lerp(floor.dark, floor.light, 0.5 + 0.5 * wave_x * wave_y)
-    color *= 1.0 - 0.62 * shadow_on_floor(sun, sums, p)
+    color *= 1.0 - 0.62 * shadow_on_floor(sun, p)
     return wp.lerp(color, sky, away * away / (1.0 + away * away))
 
 
@@ -263,7 +266,6 @@ def background(
 def surface_color(
     sun: Sun,
     surfaces: Surfaces,
-    depths: wp.array(dtype=wp.uint64),
     d: wp.vec3,
     depth: float,
     surface: int,
@@ -294,7 +296,7 @@ def surface_color(
     facing = wp.max(wp.dot(normal, sun.direction), 0.0)
     sunlight = wp.float32(0.0)
     if facing > 0.0:
-        sunlight = 1.0 - shadow_on_surface(sun, depths, p, normal)
+        sunlight = 1.0 - shadow_on_surface(sun, p, normal)
     from_above = 0.5 + 0.5 * wp.dot(normal, sun.up)
     skylight = wp.lerp(wp.vec3(0.30, 0.29, 0.28), wp.vec3(0.46, 0.50, 0.56), from_above)
     light = skylight + wp.vec3(0.74, 0.71, 0.66) * (facing * sunlight)
@@ -313,8 +315,6 @@ def pixel_color(
     sun: Sun,
     floor: Floor,
     surfaces: Surfaces,
-    depths: wp.array(dtype=wp.uint64),
-    sums: wp.array2d(dtype=wp.vec2i),
     keys: wp.array(dtype=wp.uint64),
     x: int,
     y: int,
@@ -340,10 +340,10 @@ def pixel_color(
             color = wp.vec3(0.0, 0.0, 0.0)
             if depth <= ground:
                 surface = int(key & _SURFACE_BITS)
-                color = surface_color(sun, surfaces, depths, d, depth, surface)
+                color = surface_color(sun, surfaces, d, depth, surface)
             else:
                 depth = ground
-                color = background(lens, sun, floor, sums, d, ground)
+                color = background(lens, sun, floor, d, ground)
             total += count * through_water(floor, sun, d, depth, color)
     return total / float(SAMPLES)
 
@@ -355,8 +355,6 @@ def shade(
     sun: Sun,
     floor: Floor,
     surfaces: Surfaces,
-    depths: wp.array(dtype=wp.uint64),
-    sums: wp.array2d(dtype=wp.vec2i),
     keys: wp.array(dtype=wp.uint64),
     encode: wp.array(dtype=wp.uint8),  # linear 0 ... 1 -> screen value
     stride: int,
@@ -367,7 +365,7 @@ def shade(
     y, start = wp.tid()
     brightest = float(encode.shape[0] - 1)
     for x in range(start, lens.width, stride):
-        color = pixel_color(lens, offsets, sun, floor, surfaces, depths, sums, keys, x, y)
+        color = pixel_color(lens, offsets, sun, floor, surfaces, keys, x, y)
         for channel in range(3):
             value = wp.clamp(color[channel], 0.0, 1.0) * brightest
             picture[lens.first_row + y, x, channel] = encode[int(value + 0.5)]

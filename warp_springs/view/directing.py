@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,17 +23,31 @@ _SAMPLES = 40
 _RING = 24
 
 
+@dataclass(frozen=True)
+class Setting:
+    """What all shots of a film have in common.
+
+    Attributes:
+        times: The times that are shown [s], (K,).
+        scene: The world.
+        look: How it is drawn; its azimuth, elevation and camera are kept where they are given.
+        cut: Whether the camera follows and turns.
+    """
+
+    times: FloatArray
+    scene: Scene
+    look: Look
+    cut: Cut
+
+
 class Director:
     """Decides on the camera at any time: it follows the robots calmly, and may walk around them."""
 
     def __init__(
         self,
         actors: Sequence[Actor],
-        times: FloatArray,
+        setting: Setting,
         size: tuple[int, int],
-        look: Look,
-        cut: Cut,
-        scene: Scene,
         *,
         tile: bool = False,
     ):
@@ -40,13 +55,11 @@ class Director:
 
         Args:
             actors: At their places.
-            times: The times that are shown [s], (K,).
+            setting: With a floor the camera keeps its height; obstacles nearby are shown.
             size: Of the picture in pixels.
-            look: Its azimuth, elevation and camera are kept where they are given.
-            cut: Whether the camera follows and turns.
-            scene: With a floor the camera keeps its height; obstacles nearby are shown.
             tile: Whether the picture is one of several in a panel.
         """
+        times, scene, look, cut = setting.times, setting.scene, setting.look, setting.cut
         self._actors, self._size, self._look, self._turns = actors, size, look, cut.turns
         self._times = actors[0].times
         way = np.mean([a.calm_way + a.offset for a in actors], axis=0)

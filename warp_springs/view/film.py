@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from warp_springs.view import labels as texts
 from warp_springs.view.actors import Actor, FloatArray, actors_of
-from warp_springs.view.directing import Director, put_on_grid, spread
+from warp_springs.view.directing import Director, Setting, put_on_grid, spread
 from warp_springs.view.look import Cut, Look
 from warp_springs.view.rasteriser import Rasteriser
 from warp_springs.view.scenery import draw_scene
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
-    from warp_springs.scene import Scene
 
 Pixels = NDArray[np.uint8]
 
@@ -44,10 +43,7 @@ class Shot:
     def __init__(
         self,
         actors: Sequence[Actor],
-        times: FloatArray,
-        scene: Scene,
-        look: Look,
-        cut: Cut,
+        setting: Setting,
         rasteriser: Rasteriser,
         *,
         labels: Sequence[str] | None = None,
@@ -58,21 +54,15 @@ class Shot:
 
         Args:
             actors: The robots; on a grid they are moved.
-            times: The times that will be shown [s], (K,).
-            scene: Their world.
-            look: How they are drawn.
-            cut: How the camera moves.
+            setting: Where, when and how they are shown.
             rasteriser: Draws; its size is that of the picture.
             labels: A text below each robot; in a tile, in its upper left corner.
             tile: Whether this is a tile of a panel.
             grid: Whether the robots are to be moved onto a grid.
         """
-        self.actors, self._scene, self._look = actors, scene, look
+        self.actors, self._setting = actors, setting
         self._rasteriser, self._tile = rasteriser, tile
-        self._floor = scene.ground is not None
-        self._setting = {"times": times, "size": rasteriser.size, "look": look, "cut": cut}
-        self._setting |= {"scene": scene, "tile": tile}
-        self._times = times
+        self._floor = setting.scene.ground is not None
         letters = max(_SMALLEST_LETTERS, round(rasteriser.size[1] * _LETTERS_PER_HEIGHT))
         letters = max(letters, 14) if tile else letters
         self._images = [texts.text_image(label, letters) for label in labels or ()]
@@ -83,7 +73,7 @@ class Shot:
 
     def draw(self, time: float, share: float = 0.0) -> Pixels:
         """Return the picture at a time [s], after a share 0 ... 1 of the film."""
-        drawing = draw_scene(self.actors, self._scene, self._look, time)
+        drawing = draw_scene(self.actors, self._setting.scene, self._setting.look, time)
         camera = self.director.camera(time, share)
         pixels = self._rasteriser.draw(drawing, camera)
         if self._tile:
@@ -95,14 +85,14 @@ class Shot:
         return pixels
 
     def _direct(self, back: float = 1.0) -> None:
-        self.director = Director(self.actors, **self._setting)
+        self.director = Director(self.actors, self._setting, self._rasteriser.size, tile=self._tile)
         self.director.stand_back(back)
         self._hang_labels()
 
     def _make_room(self, cells: FloatArray | None) -> None:
         """Move robots of a grid apart and the camera back until nothing hides anything."""
         apart = back = 1.0
-        for _ in range(_TRIES if self._look.camera is None else 0):
+        for _ in range(_TRIES if self._setting.look.camera is None else 0):
             crowded, cut_off = self._faults()
             if crowded and cells is not None:
                 apart *= _APART
@@ -115,9 +105,10 @@ class Shot:
 
     def _samples(self) -> list[tuple[float, float]]:
         """Times that are looked at beforehand, and their shares of the film."""
-        count = len(self._times)
+        times = self._setting.times
+        count = len(times)
         chosen = np.unique(np.linspace(0, count - 1, _SAMPLES).astype(int))
-        return [(float(self._times[i]), i / count) for i in chosen]
+        return [(float(times[i]), i / count) for i in chosen]
 
     def _hang_labels(self) -> None:
         """Find how far below the place of a robot its label must hang to hide none of it."""
@@ -208,13 +199,13 @@ class Film:
         self.times = _times(actors[0].times, cut) if moving else actors[0].times
         self.cycle = max((a.cycle for a in actors if math.isfinite(a.cycle)), default=math.inf)
         layout = look.layout or _usual_layout(result, len(robots))
-        scene = result.scene
+        setting = Setting(self.times, result.scene, look, cut)
         if layout != "panel" or len(actors) == 1:
             grid = layout == "grid" and len(actors) > 1
-            shot = Shot(actors, self.times, scene, look, cut, rasteriser, labels=labels, grid=grid)
+            shot = Shot(actors, setting, rasteriser, labels=labels, grid=grid)
             self.shots = [(shot, slice(None), slice(None))]
         else:
-            self.shots = list(_panel(actors, self.times, scene, look, cut, rasteriser, labels))
+            self.shots = list(_panel(actors, setting, rasteriser, labels))
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -248,10 +239,7 @@ class Film:
 
 def _panel(
     actors: Sequence[Actor],
-    times: FloatArray,
-    scene: Scene,
-    look: Look,
-    cut: Cut,
+    setting: Setting,
     rasteriser: Rasteriser,
     labels: Sequence[str] | None,
 ) -> Iterator[tuple[Shot, slice, slice]]:
@@ -269,7 +257,7 @@ def _panel(
         row, column = divmod(i, columns)
         y, x = top + row * (height + _GUTTER), left + column * (width + _GUTTER)
         words = None if labels is None else [labels[i]]
-        shot = Shot([actor], times, scene, look, cut, small, labels=words, tile=True)
+        shot = Shot([actor], setting, small, labels=words, tile=True)
         yield shot, slice(y, y + height), slice(x, x + width)
 
 

@@ -167,7 +167,7 @@ class Rasteriser:
         lens.rows = min(self._band_rows, height - start)
         lens.parts = self._parts
         self._draw_surfaces(lens, self._samples, surfaces.points, surfaces, keys)
-        inputs = [lens, self._samples, sun, floor, surfaces, self._map, self._sums, keys]
+        inputs = [lens, self._samples, sun, floor, surfaces, keys]
         self._launch(
             shading.shade,
             (lens.rows, self._stride),
@@ -250,6 +250,7 @@ class Rasteriser:
         sun.scale = 1 / texel
         sun.center = self._map_size / 2
         sun.size = self._map_size
+        sun.depths, sun.sums = self._map, self._sums
         # the height of a point X, Y, Z of the sun's view above the floor is rise . (X, Y, Z) + foot
         height = drawing.floor or 0.0
         rise, foot = axes[:, 2], axes[:, 2] @ origin - height
@@ -261,9 +262,7 @@ class Rasteriser:
 
         points = self._array(seen - origin, wp.vec3)
         self._draw_surfaces(lens, self._middle, points, surfaces, self._map)
-        self._launch(
-            shading.sum_rows, self._map_size, inputs=[sun, self._map], outputs=[self._sums]
-        )
+        self._launch(shading.sum_rows, self._map_size, inputs=[sun], outputs=[self._sums])
         threads = -(-self._map_size // int(shading.COLUMNS_A_THREAD))
         self._launch(shading.sum_columns, threads, inputs=[], outputs=[self._sums])
         return sun
