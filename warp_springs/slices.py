@@ -36,7 +36,7 @@ def cut(
     work = (springs + 2 * masses) * division
     pieces = SLICES_PER_THREAD * threads if threads > 1 else 1
     target = work.sum() / pieces
-    slices = []
+    slices, filled = [], {}
     for group in batch.groups:
         if group.layout != "lanes":
             slices += crowds(group, batch, buffers, device, threads)
@@ -48,7 +48,10 @@ def cut(
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             load = int(work[first:last].sum()) * group.features.width
             largest = (int(masses[first:last].max()), int(springs[first:last].max()))
-            slices.append(Slice(group, first, last, load, largest, buffers))
+            if not filled:
+                kinds = structs(group.features.precision)
+                filled = {kind.key.lower(): _filled(kind, buffers) for kind in kinds}
+            slices.append(Slice(group, first, last, load, largest, buffers, filled))
     return slices
 
 
@@ -69,6 +72,7 @@ class Slice:
         work: int,
         largest: tuple[int, int],
         buffers: Mapping[str, np.ndarray],
+        filled: Mapping[str, object],
     ) -> None:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
@@ -80,9 +84,7 @@ class Slice:
             "which": _on_device(np.arange(first, last, dtype=np.int32)),
             "first_bundle": first,
         }
-        for struct in structs(group.features.precision):
-            given[struct.key.lower()] = _filled(struct, buffers)
-        self._given = given
+        self._given = given | filled
         self._everything = given["which"]
         self._launches: dict[bool, tuple[wp.Launch, wp.Launch]] = {}
         self.prepare(ledger=False)
