@@ -20,6 +20,7 @@ from warp_springs.element_packing import (
     element_buffers,
     element_counts,
     element_lists,
+    spring_columns,
     traits_of,
 )
 from warp_springs.elements import NONE
@@ -31,6 +32,7 @@ from warp_springs.method import Method
 from warp_springs.packing import (
     Strip,
     aligned,
+    breathes,
     coefficients,
     lane_major,
     largest,
@@ -149,6 +151,8 @@ class Batch:
         arrays: The flat buffers of ``PACKED``, by name, on 64-byte boundaries.
         substeps: Contact sub-steps of each robot, shape (N,).
         levels: Halvings of the step of the run for each robot, shape (N,).
+        wearing: For each robot whose springs may break, where they are in the buffer of the times
+            when they broke, shape (S,), and its lane.
         rounding: Energy that rounding alone may give each robot [J], shape (N,).
     """
 
@@ -168,6 +172,7 @@ class Batch:
         self.substeps = np.ones(len(robots), np.int64)
         self.levels = np.zeros(len(robots), np.int64)
         self.rounding = np.zeros(len(robots))
+        self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
 
         # An absurd robot may overflow here; its status will say so.
@@ -243,7 +248,7 @@ class Batch:
 
     def _alike(self, cohort: Strip) -> Iterator[tuple[bool, np.ndarray]]:
         """Members of a cohort that may share bundles: alike in actuation, step and sub-steps."""
-        actuated = largest(np.abs(cohort.fields["amplitude"]), cohort.counts) > 0.0
+        actuated = breathes(cohort)
         levels = self._method.levels(cohort, self._scene)
         substeps = self._method.substeps(cohort, self._scene, levels)
         kinds, kind = np.unique(np.stack([actuated, levels, substeps]), axis=1, return_inverse=True)
@@ -279,9 +284,13 @@ class Batch:
         self._slot[strip.ids] = np.stack(
             [len(self) + within // width, within % width, np.full(n, width)], axis=1
         )
-        self._tables.append(self._describe(strip, width, 4 if actuated else 2))
-
         order, row, partner = sort_rows(strip)
+        table = coefficients(strip.fields, order, actuated)
+        elements = {}
+        if strip.elements is not NONE:
+            elements = element_buffers(strip.fields, order, method.spans(levels))
+            table = np.concatenate([table, spring_columns(strip.fields, order)], axis=1)
+        self._tables.append(self._describe(strip, width, table.shape[1], elements))
         self._append("rows", row)
         self._append("partners", partner)
         if width > 1:
@@ -291,7 +300,7 @@ class Batch:
         oscillators = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
         per_robot = {  # values, and how many rows of them each robot has
             "inverse_masses": (1.0 / fields["masses"], strip.masses),
-            "coefficients": (coefficients(fields, order, actuated), strip.counts),
+            "coefficients": (table, strip.counts),
             "omegas": (fields["omega"], one),
             "positions": (fields["positions"], strip.masses),
             "velocities": (fields["velocities"], strip.masses),
@@ -311,9 +320,10 @@ class Batch:
         invalid = largest(fields["masses"], strip.masses) > np.finfo(real).max
         for name, (values, rows) in per_robot.items():
             cast = values.astype(dtype_of(name, method.precision), copy=False)
-            invalid |= not_finite(cast, rows)
+            if name != "coefficients" or strip.elements is NONE:  # limits may be infinite
+                invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
-        self._pack_elements(strip, width)
+        self._pack_elements(strip, width, elements, order, row)
         # A stiffness that vanishes would be divided by.
         vanished = fields["stiffness"].astype(real) == 0.0
         invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
@@ -329,17 +339,42 @@ class Batch:
                 name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)
             )
 
-    def _pack_elements(self, strip: Strip, width: int) -> None:
+    def _pack_elements(
+        self,
+        strip: Strip,
+        width: int,
+        elements: dict[str, np.ndarray],
+        order: np.ndarray | slice,
+        row: np.ndarray,
+    ) -> None:
         """Append the arrays of the elements of a strip."""
         if strip.elements is NONE:
             return
-        for name, values in element_buffers(strip.fields).items():
+        for name, values in elements.items():
             cast = values.astype(dtype_of(name, self._method.precision))
             self._append(name, lane_major(cast, len(strip.ids), width))
-        for name, values in element_lists(strip.elements).items():
+        if "worn" in elements:
+            self._keep_places(strip, width, order)
+        lists = element_lists(strip.elements)
+        lists["spring_starts"] = np.repeat(np.arange(len(row) - 1), np.diff(row)).astype(np.int32)
+        for name, values in lists.items():
             self._append(name, values)
 
-    def _describe(self, strip: Strip, width: int, columns: int) -> np.ndarray:
+    def _keep_places(self, strip: Strip, width: int, order: np.ndarray | slice) -> None:
+        """Remember where springs that may break are, in the order of the user's springs."""
+        springs = len(strip.springs)
+        place = np.argsort(
+            np.arange(springs)[order] if isinstance(order, slice) else order[:springs]
+        )
+        end = self._sizes["broken_at"]  # just appended
+        bundles = -(-len(strip.ids) // width)
+        for k, robot in enumerate(strip.ids.tolist()):
+            start = end - (bundles - k // width) * springs * width
+            self.wearing[robot] = start + place * width + k % width, k % width
+
+    def _describe(
+        self, strip: Strip, width: int, columns: int, elements: dict[str, np.ndarray]
+    ) -> np.ndarray:
         """The rows of the table of bundles for a strip."""
         masses, counts = strip.masses[::width], strip.counts[::width]
         blocks = {
@@ -352,7 +387,6 @@ class Batch:
             "pair": ("pairs", 0 * counts),
         }
         # Each bundle of a strip has as many values of its elements.
-        elements = element_buffers(strip.fields)
         sizes = {name: values.size // len(strip.ids) for name, values in elements.items()}
         for name, column in PACKED_ELEMENTS.items():
             blocks[column] = (name, np.full(len(masses), sizes.get(name, 0) * width))

@@ -18,6 +18,7 @@ __all__ = [
     "element_counts",
     "element_fields",
     "element_lists",
+    "spring_columns",
     "traits_of",
 ]
 
@@ -27,9 +28,14 @@ PACKED_ELEMENTS = {
     "outer_windows": "window",
     "skins": "skin",
     "bonds": "bond",
+    "spring_omegas": "own_omega",
+    "spring_oscillators": "turning",
+    "schedules": "schedule",
+    "worn": "worn",
+    "broken_at": "broken",
 }
 #: Buffers with lists that robots of one structure share, likewise.
-SHARED_ELEMENTS = {"outer_masses": "outer_list"}
+SHARED_ELEMENTS = {"outer_masses": "outer_list", "spring_starts": "spring_list", "times": "time"}
 
 
 def traits_of(elements: Elements) -> Traits:
@@ -40,6 +46,13 @@ def traits_of(elements: Elements) -> Traits:
         outer=bool(elements.pushes or elements.tethers),
         skin=elements.contact is not None,
         bound=len(elements.bonds) > 0,
+        harmonics=0 if elements.harmonics is None else elements.harmonics.shape[1],
+        own_omegas=elements.omegas is not None,
+        curved=any(x is not None for x in (elements.slope, elements.cubic, elements.hinges)),
+        hinges=0 if elements.hinges is None else elements.hinges.shape[1],
+        dashpots=elements.dashpot is not None,
+        limits=elements.breaks is not None or elements.yields is not None,
+        timetable=elements.timetable is not None,
     )
 
 
@@ -64,6 +77,11 @@ def element_fields(
     else:
         parts = [_fields(robot.elements, robot) for robot in robots]
         found = {name: np.stack([part[name] for part in parts]) for name in parts[0]}
+    if "dashpot" in found:
+        i, j = first.springs.T
+        w = 1.0 / dense["masses"]
+        critical = 2.0 * np.sqrt(dense["stiffness"] / (w[:, i] + w[:, j]))
+        found["damping"] = found["dashpot"] * critical  # N s/m
     if len(first.elements.bonds):
         x, v = dense["positions"], dense["velocities"]
         if isinstance(robots, Variants):
@@ -97,6 +115,8 @@ def _fields(elements: Elements, robot: Robot) -> dict[str, np.ndarray]:
         columns = (*diagonal, *corner, *bonds.points.T, bonds.radii)
         table[bonds.masses] = np.stack(columns, axis=1)
         found["bond_table"] = table
+    if elements.timetable is not None:
+        found["factors"], found["offsets"] = elements.timetable.factors, elements.timetable.offsets
     return found
 
 
@@ -104,7 +124,11 @@ def element_lists(elements: Elements) -> dict[str, np.ndarray]:
     """Lists that all robots of one structure share."""
     pushed = [mass for push in elements.pushes for mass in push.masses]
     tethered = [tether.mass for tether in elements.tethers]
-    return {"outer_masses": np.array(pushed + tethered, np.int32)}
+    table = elements.timetable
+    return {
+        "outer_masses": np.array(pushed + tethered, np.int32),
+        "times": np.zeros(0) if table is None else np.append(table.times, table.period),
+    }
 
 
 def element_counts(elements: Elements) -> dict[str, int]:
@@ -112,11 +136,17 @@ def element_counts(elements: Elements) -> dict[str, int]:
     return {
         "pushes": sum(len(push.masses) for push in elements.pushes),
         "tethers": len(elements.tethers),
+        "times": 0 if elements.timetable is None else len(elements.timetable.times),
     }
 
 
-def element_buffers(fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Values of the buffers of ``PACKED_ELEMENTS`` for a strip, its robots end to end."""
+def element_buffers(
+    fields: dict[str, np.ndarray], order: np.ndarray | slice, spans: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Values of the buffers of ``PACKED_ELEMENTS`` for a strip, its robots end to end.
+
+    ``order`` sorts its springs, ``spans`` are the drifts of its robots [s], shape (n,).
+    """
     found = {}
     if "outer" in fields:
         found |= {"outer_values": fields["outer"], "outer_windows": fields["windows"]}
@@ -125,4 +155,41 @@ def element_buffers(fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         found["skins"] = np.where(np.isnan(skin), -1.0, skin)
     if "bond_table" in fields:
         found["bonds"] = fields["bond_table"]
+    stiffness = fields["stiffness"][order]
+    each = len(stiffness) // max(len(spans), 1)
+    if "omegas" in fields:
+        given, common = fields["omegas"][order], np.repeat(fields["omega"], each)
+        omegas = np.where(np.isnan(given), common, given)
+        turn = omegas * np.repeat(spans, each)
+        found["spring_omegas"] = omegas
+        start = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
+        found["spring_oscillators"] = start
+    if "factors" in fields:
+        half = 0.5 * stiffness[:, None] * fields["offsets"][order]
+        found["schedules"] = np.stack([fields["factors"][order], half], axis=-1)
+    if "breaks" in fields or "yields" in fields:
+        found["worn"] = np.tile([0.0, 1.0], (len(stiffness), 1))
+        found["broken_at"] = np.full(len(stiffness), np.nan)
     return found
+
+
+def spring_columns(fields: dict[str, np.ndarray], order: np.ndarray | slice) -> np.ndarray:
+    """What follows the coefficients of the sorted springs, shape (total, ...); see the kernels."""
+    k = fields["stiffness"][order]
+    none = np.zeros_like(k)
+    columns = []
+    if "harmonics" in fields:
+        half, (size, phase) = 0.5 * k[:, None], np.moveaxis(fields["harmonics"][order], -1, 0)
+        parts = np.stack([half * size * np.cos(phase), half * size * np.sin(phase)], axis=-1)
+        columns += list(parts.reshape(len(k), -1).T)
+    if {"slope", "cubic", "hinges"} & fields.keys():
+        columns.append(fields["slope"][order] if "slope" in fields else none + 1.0)
+        columns.append(fields["cubic"][order] / k if "cubic" in fields else none)
+        if "hinges" in fields:
+            columns += list(fields["hinges"][order].reshape(len(k), -1).T)
+    if "dashpot" in fields:
+        columns.append(fields["damping"][order])
+    if {"breaks", "yields"} & fields.keys():
+        for name in ("breaks", "yields"):
+            columns.append(fields[name][order] if name in fields else none + np.inf)
+    return np.stack(columns, axis=1) if columns else np.zeros((len(k), 0))

@@ -22,11 +22,14 @@ class Energy:
         gravity: -sum of m g . x, zero at the origin; in water less what lifts, zero above it.
         spring: sum of k (L - L0(t))^2 / 2.
         ground: sum of K_G z^2 / 2 over the masses below z = 0; of K d^2 / 2 in obstacles.
-        work: Work of the breathing springs, the integral of -sum of k (L - L0) dL0/dt.
+        work: Work of the springs that change in time: the integral of -sum of k (L - L0) dL0/dt,
+            and of dk/dt (L - L0)^2 / 2.
         damping_loss: Loss to the damping rate.
         drag_loss: Loss to drag; negative where a wind gives more than the drag takes.
         friction_loss: Loss to friction on the ground and on obstacles.
         outer_work: Work of forces from outside: pushes and soft constraints.
+        dashpot_loss: Loss to the dashpots of springs.
+        plastic_loss: Loss to springs that yielded or broke.
     """
 
     kinetic: np.ndarray
@@ -38,6 +41,8 @@ class Energy:
     drag_loss: np.ndarray
     friction_loss: np.ndarray
     outer_work: np.ndarray
+    dashpot_loss: np.ndarray
+    plastic_loss: np.ndarray
 
     @property
     def total(self) -> np.ndarray:
@@ -47,8 +52,9 @@ class Energy:
 
     @property
     def losses(self) -> np.ndarray:
-        """Loss to damping, drag and friction, shape (N, F)."""
-        return self.damping_loss + self.drag_loss + self.friction_loss
+        """Loss to damping, drag, friction, dashpots and plastic flow, shape (N, F)."""
+        outside = self.damping_loss + self.drag_loss + self.friction_loss
+        return outside + self.dashpot_loss + self.plastic_loss
 
     @property
     def residual(self) -> np.ndarray:

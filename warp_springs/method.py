@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_springs.kernels.law import DRIFTS, constants
-from warp_springs.packing import Strip, largest
+from warp_springs.packing import Strip, breathes, fastest_actuation, largest
 from warp_springs.scene import Scene
 from warp_springs.stability import Limits, Status, certainly_unstable, stable_step
 
@@ -58,9 +58,8 @@ class Method:
         if not self.auto:
             return np.zeros(len(strip.ids), np.int64)
         wanted = self.dt / (AUTO_PART * stable_step(strip, scene, self.integrator))
-        breathes = largest(np.abs(strip.fields["amplitude"]), strip.counts) > 0.0
-        turn = np.abs(strip.fields["omega"]) * self.dt / BREATHING_PHASE
-        wanted = np.maximum(wanted, np.where(breathes, turn, 0.0))
+        turn = fastest_actuation(strip) * self.dt / BREATHING_PHASE
+        wanted = np.maximum(wanted, np.where(breathes(strip), turn, 0.0))
         levels = np.ceil(np.log2(np.clip(wanted, 1.0, 2.0**LEVELS))).astype(np.int64)
         # A robot that is refused even so is not stepped at all.
         return np.where(self._refused(strip, scene, levels), 0, levels)

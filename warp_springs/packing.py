@@ -17,9 +17,12 @@ from warp_springs.variants import Variants
 __all__ = [
     "Strip",
     "aligned",
+    "breathes",
     "coefficients",
+    "fastest_actuation",
     "lane_major",
     "largest",
+    "largest_change",
     "local_frames",
     "longest_springs",
     "not_finite",
@@ -230,7 +233,7 @@ def longest_springs(strip: Strip) -> np.ndarray:
     The largest of the initial lengths and of the rest lengths plus amplitudes.
     """
     fields = strip.fields
-    meant = largest(fields["rest_length"] + np.abs(fields["amplitude"]), strip.counts)
+    meant = largest(fields["rest_length"] + largest_change(fields), strip.counts)
     positions, counts, springs = fields["positions"], strip.counts, strip.springs
     if strip.shared:
         poses = positions.reshape(len(counts), -1, 3)
@@ -244,6 +247,34 @@ def longest_springs(strip: Strip) -> np.ndarray:
     d = positions.take(end, axis=0)
     d -= positions.take(start, axis=0)
     return np.maximum(np.sqrt(largest(np.einsum("ij,ij->i", d, d), counts)), meant)
+
+
+def largest_change(fields: dict[str, np.ndarray]) -> np.ndarray:
+    """The most that actuation and winches add to the rest length of each spring [m]."""
+    change = np.abs(fields["amplitude"])
+    if "harmonics" in fields:
+        change = change + np.abs(fields["harmonics"][..., 0]).sum(axis=-1)
+    if "offsets" in fields:
+        change = change + np.abs(fields["offsets"]).max(axis=-1)
+    return change
+
+
+def fastest_actuation(strip: Strip) -> np.ndarray:
+    """The largest angular frequency of each robot's springs, harmonics too [rad/s], shape (n,)."""
+    omega = np.abs(strip.fields["omega"])
+    if "omegas" in strip.fields:
+        own = np.nan_to_num(np.abs(strip.fields["omegas"]), nan=0.0)
+        omega = np.maximum(omega, largest(own, strip.counts))
+    harmonics = strip.fields.get("harmonics")
+    return omega * (1 if harmonics is None else harmonics.shape[1] + 1)
+
+
+def breathes(strip: Strip) -> np.ndarray:
+    """Whether a robot has springs that oscillate, shape (n,) bool."""
+    size = np.abs(strip.fields["amplitude"])
+    if "harmonics" in strip.fields:
+        size = size + np.abs(strip.fields["harmonics"][..., 0]).sum(axis=-1)
+    return largest(size, strip.counts) > 0.0
 
 
 def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -66,6 +66,7 @@ class Result:
     _positions: np.ndarray = field(repr=False)
     _velocities: np.ndarray = field(repr=False)
     _frames: Mapping[int, np.ndarray] = field(repr=False)
+    _worn: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         """Number of robots N."""
@@ -118,6 +119,21 @@ class Result:
         from warp_springs.io.results import load_result
 
         return load_result(path)
+
+    def broken(self, robot: int) -> np.ndarray:
+        """When each spring of a robot broke [s], shape (S,); NaN for those that hold."""
+        return self._wear(robot)[0]
+
+    def yielded(self, robot: int) -> np.ndarray:
+        """How much longer each spring's rest length became by yielding [m], shape (S,)."""
+        return self._wear(robot)[1]
+
+    def _wear(self, robot: int) -> np.ndarray:
+        robot = self._index(robot)
+        if robot in self._worn:
+            return self._worn[robot]
+        springs = self.robots[robot].n_springs
+        return np.stack([np.full(springs, np.nan), np.zeros(springs)])
 
     def _index(self, robot: int) -> int:
         count = len(self.robots)

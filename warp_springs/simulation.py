@@ -221,6 +221,14 @@ class Simulation:
         steps = first + np.rint(np.arange(count) / (fps * self.dt)).astype(np.int64)
         return np.minimum(steps, last).tolist()
 
+    def _worn(self) -> dict[int, np.ndarray]:
+        """When springs broke [s] and how far they flowed [m], (2, S), where they have limits."""
+        worn, broken = self._buffers["worn"], self._buffers["broken_at"]
+        found = {}
+        for robot, (place, lane) in self._batch.wearing.items():
+            found[robot] = np.stack([broken[place], worn[2 * (place - lane) + lane]])
+        return found
+
     def _find_gains(self, energy: Energy, times, status, stopped_at) -> None:
         """Mark healthy robots that gained energy from nowhere, with the time it was first seen."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -262,6 +270,7 @@ class Simulation:
             spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
             _slots=slots,
+            _worn=self._worn(),
             _positions=buffers["seen_positions"].copy(),
             _velocities=buffers["seen_velocities"].copy(),
             _frames={i: f for tape in tapes for i, f in tape.frames_by_robot().items()},

@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 
 from warp_springs.checks import check_choice, check_number
-from warp_springs.packing import Strip, largest
+from warp_springs.elements import NONE
+from warp_springs.packing import Strip, largest, largest_change
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.variants import Variants
@@ -97,9 +98,11 @@ def stable_dt(
     check_choice("integrator", integrator, ("chin4", "leapfrog", "euler"))
     scene = Scene() if scene is None else scene
     if isinstance(robots, Robot):
-        strip = Strip.ragged([0], [robots])
+        strip = Strip.alike([0], [robots])
     elif isinstance(robots, Variants):
         strip = Strip.variants(robots)
+    elif any(robot.elements is not NONE for robot in robots):
+        return np.array([stable_dt(robot, scene, integrator) for robot in robots])
     else:
         strip = Strip.ragged(range(len(robots)), robots)
     # An absurd robot may overflow here: no step is small enough for it.
@@ -125,10 +128,66 @@ def _largest_frequency(strip: Strip) -> np.ndarray:
     """A bound of the largest angular frequency of the springs in any pose [rad/s], shape (n,)."""
     fields, ends = strip.fields, _ends(strip)
     per_mass = np.zeros(len(fields["masses"]))
+    stiffness = stiffest(fields)
     for end in ends:
-        per_mass += np.bincount(end, fields["stiffness"], minlength=len(per_mass))
+        per_mass += np.bincount(end, stiffness, minlength=len(per_mass))
+    tethers = _tether_stiffness(strip)
+    per_mass = (per_mass + tethers) / fields["masses"]
+    squares = largest(per_mass[ends[0]] + per_mass[ends[1]], strip.counts)
+    if tethers.any():
+        squares = np.maximum(squares, largest(per_mass, strip.masses))
+    frequency = np.sqrt(squares)
+    return frequency + _damping_rate(strip, ends) if "damping" in fields else frequency
+
+
+def stiffest(fields: dict[str, np.ndarray]) -> np.ndarray:
+    """The largest slope that the tension of each spring may have [N/m], shape (total,).
+
+    A cubic spring has it where it is stretched, or squeezed, by half its rest length more than
+    its actuation alone does.
+    """
+    k = fields["stiffness"]
+    slope = fields.get("slope", np.ones_like(k))
+    if "hinges" in fields:
+        order = np.argsort(fields["hinges"][..., 0], axis=-1)
+        parts = np.take_along_axis(fields["hinges"][..., 1], order, axis=-1)
+        slope = np.maximum(slope, (slope[:, None] + np.cumsum(parts, axis=-1)).max(axis=-1))
+    k = k * slope
+    if "cubic" in fields:
+        far = 0.5 * fields["rest_length"] + largest_change(fields)
+        k = k + 3.0 * fields["cubic"] * far**2
+    return k * fields["factors"].max(axis=-1) if "factors" in fields else k
+
+
+def _softest(fields: dict[str, np.ndarray]) -> np.ndarray:
+    """The least slope that the tension of each spring may have [N/m], shape (total,)."""
+    k = fields["stiffness"]
+    if {"slope", "hinges", "breaks", "yields"} & fields.keys():
+        return np.zeros_like(k)
+    return k * fields["factors"].min(axis=-1) if "factors" in fields else k
+
+
+def _tether_stiffness(strip: Strip) -> np.ndarray:
+    """Stiffness of the tethers of each mass of all robots [N/m]."""
+    total = np.zeros(len(strip.fields["masses"]))
+    tethers = strip.elements.tethers
+    if tethers:
+        n = len(strip.ids)
+        values = strip.fields["outer"].reshape(n, -1, 5)[:, -len(tethers) :, 3]
+        first = np.cumsum(strip.masses) - strip.masses
+        at = first[:, None] + np.array([tether.mass for tether in tethers])
+        np.add.at(total, at.ravel(), values.ravel())
+    return total
+
+
+def _damping_rate(strip: Strip, ends: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """A bound of the fastest decay that dashpots cause [1/s], shape (n,)."""
+    fields = strip.fields
+    per_mass = np.zeros(len(fields["masses"]))
+    for end in ends:
+        per_mass += np.bincount(end, fields["damping"], minlength=len(per_mass))
     per_mass /= fields["masses"]
-    return np.sqrt(largest(per_mass[ends[0]] + per_mass[ends[1]], strip.counts))
+    return largest(per_mass[ends[0]] + per_mass[ends[1]], strip.counts)
 
 
 def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndarray:
@@ -140,7 +199,9 @@ def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndar
     fields = strip.fields
     start, end = _ends(strip)
     w = 1.0 / fields["masses"]
-    certain = np.sqrt(largest(fields["stiffness"] * (w[start] + w[end]), strip.counts))
+    if "bond_table" in fields:  # what is held may be as good as infinitely heavy
+        w = np.where((fields["bond_table"][:, :3] == 1.0).all(axis=1), w, 0.0)
+    certain = np.sqrt(largest(_softest(fields) * (w[start] + w[end]), strip.counts))
     return certain * dt > _limit(0.0 * certain, integrator)
 
 

@@ -11,8 +11,6 @@ from warp_springs.variants import Variants
 
 __all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
 
-UNKNOWN = ("harmonics", "omegas", "cubic", "slope", "hinges", "dashpot", "breaks", "yields")
-
 
 def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     """The elements of robots, each structure once or more."""
@@ -33,9 +31,6 @@ def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) ->
         raise NotImplementedError("Scene.collisions cannot be simulated yet")
     placed = bool(scene.obstacles)
     for elements in elements_of(robots):
-        for name in (*UNKNOWN, "timetable"):
-            if getattr(elements, name) is not None:
-                raise NotImplementedError(f"Elements.{name} cannot be simulated yet")
         placed |= len(elements.bonds) > 0 or len(elements.tethers) > 0
     if placed and precision == "mixed":
         raise NotImplementedError(

@@ -78,6 +78,8 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> Path:
             _write_states(file, name, getattr(result, name), header["masses"])
         for index in result.recorded:
             _write(file, f"frames/{index}", np.asarray(result.frames(index), np.float64))
+        for index, worn in result._worn.items():
+            _write(file, f"worn/{index}", worn)
     return path
 
 
@@ -100,6 +102,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
             _positions=entries["positions"],
             _velocities=entries["velocities"],
             _frames={index: entries[f"frames/{index}"] for index in fields["recorded"]},
+            _worn={int(key[5:]): worn for key, worn in entries.items() if key[:5] == "worn/"},
         )
     except OSError:
         raise

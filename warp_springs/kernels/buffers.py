@@ -50,10 +50,26 @@ BUNDLE = (
     "tethers",  # T
     "skin",  # [M][3][W]
     "bond",  # [M][10][W]
+    "spring_list",  # the lower mass of each spring, S of them
+    "own_omega",  # [S][W]
+    "turning",  # [S][4][W]
+    "time",  # T times of the timetable and its period
+    "times",  # T
+    "schedule",  # [S][T][2][W]
+    "worn",  # [S][2][W]
+    "broken",  # [S][W]
 )
 
 #: Accounts of the ledger [J]: what a robot was given and lost since it was opened.
-ACCOUNTS = ("work", "damping_loss", "drag_loss", "friction_loss", "outer_work")
+ACCOUNTS = (
+    "work",
+    "damping_loss",
+    "drag_loss",
+    "friction_loss",
+    "outer_work",
+    "dashpot_loss",
+    "plastic_loss",
+)
 #: How many energies a look finds: kinetic, gravity, spring, ground, and the accounts.
 ENERGIES = 4 + len(ACCOUNTS)
 
@@ -74,6 +90,10 @@ MODEL = {
     "outer_windows": np.float64,  # start and end, s
     "skins": REAL,  # friction and stiffness, see Own in kernels.own
     "bonds": REAL,  # constraints, likewise
+    "spring_starts": np.int32,
+    "spring_omegas": np.float64,  # rad/s, where springs have their own
+    "times": np.float64,  # s
+    "schedules": REAL,  # factor of the stiffness, and h = k / 2 times what is added to L0
     "reaches2": REAL,  # square of the length that stops a robot, m^2
     "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision
 }
@@ -92,6 +112,9 @@ STATE = {
     "good_low_velocities": REAL,
     "origins": np.float64,  # m
     "oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt): four a lane
+    "spring_oscillators": REAL,  # likewise, four a spring and lane
+    "worn": REAL,  # how far a spring has flowed, m, and 1, or 0 where it is broken
+    "broken_at": np.float64,  # s
     "states": np.int32,  # Status
     "state_times": np.float64,  # when it was found, s
     "ledgers": REAL,  # the accounts, and their good copies

@@ -8,9 +8,10 @@ from dataclasses import astuple, dataclass, replace
 
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES
 from warp_springs.kernels.dialect import vector_dialect
-from warp_springs.kernels.element_text import OWN_OF
+from warp_springs.kernels.element_text import OWN_OF, RATES
 from warp_springs.kernels.law import CONSTANTS, LAW
 from warp_springs.kernels.obstacles import RECORD
+from warp_springs.kernels.springs import KEEPING, WEAR
 from warp_springs.kernels.traits import PLAIN, Traits
 
 __all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "feature_flags", "preamble"]
@@ -130,9 +131,7 @@ double* const health_time = state.state_times.data + lane_;
 Vec* const F = (Vec*)scratch.data;
 Vec* const shifted_x = F + M;
 real* const left_over = (real*)(shifted_x + M);  // for each surface a mass may touch
-const int K = ACTUATED ? 4 : 2;
 
-auto stiffness = [=](int s) -> real { return p[K * s]; };
 // Accounts of the ledger since it was opened.
 real* const ledger = (real*)(state.ledgers.data + 2 * ACCOUNTS * lane_);
 real* const good_ledger = ledger + ACCOUNTS;
@@ -141,14 +140,19 @@ real power = zero;
 """
     + OWN_OF
     + r"""
+"""
+    + KEEPING
+    + r"""
 // Half the stiffness times the rest length, at an instant.
 auto half_rest_force = [=](int s, real si, real co) __attribute__((always_inline)) -> real {
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
 };
+auto stiffness = [=](int s) -> real { return p[K * s]; };
 // The force of spring s on its first mass, at a, whose other mass is at b.
 auto spring_force = [&](Vec a, Vec b, int s, real si, real co)
         __attribute__((always_inline)) -> Vec {
     const Vec d = b - a;
+    if (SPECIAL) return special_force(d, s, si, co);
     const real length2 = squared_length(d.x, d.y, d.z), k = stiffness(s);
     const real h = half_rest_force(s, si, co);
     if (LEDGER && ACTUATED)
@@ -193,6 +197,9 @@ auto diagnose = [=]() -> mask {
     reason = fast ? (mask{} + 3) : reason;
     return finite ? reason : (mask{} + 1);
 };
+"""
+    + RATES
+    + r"""
 auto stopped_lanes = [=]() -> mask {
     mask stopped;
     for (int l = 0; l < W; ++l) stopped[l] = health[l] != 0 ? -1 : 0;
@@ -202,7 +209,9 @@ auto all_stopped = [=]() -> bool { return !any(~stopped_lanes()); };
 """
 )
 
-CONTROL = r"""
+CONTROL = (
+    WEAR
+    + r"""
 #if MIXED
 // The origin follows a robot whose centre has left it by more than a quantum, in whole quanta.
 auto follow = [&]() {
@@ -264,14 +273,27 @@ auto set_oscillators = [&](long long n) {
         const double angle = model.omegas.data[lane_ + l] * (double(n) * exact_dt);
         sine[l] = scalar(::sin(angle)); cosine[l] = scalar(::cos(angle));
     }
+    for (int s = 0; OWN_OMEGAS && s < S; ++s)
+        for (int l = 0; l < W; ++l) {
+            const double angle = spring_omegas[W * s + l] * (double(n) * exact_dt);
+            set_lane(turning[4 * s], l, scalar(::sin(angle)));
+            set_lane(turning[4 * s + 1], l, scalar(::cos(angle)));
+        }
 };
 auto turn_oscillators = [&]() __attribute__((always_inline)) {
     if (!ACTUATED) return;
     const real si = sine, co = cosine;
     sine = si * turn_cosine + co * turn_sine;
     cosine = co * turn_cosine - si * turn_sine;
+    for (int s = 0; OWN_OMEGAS && s < S; ++s) {
+        real* const o = turning + 4 * s;
+        const real own_sine = o[0], own_cosine = o[1];
+        o[0] = own_sine * o[2] + own_cosine * o[3];
+        o[1] = own_cosine * o[2] - own_sine * o[3];
+    }
 };
 """
+)
 
 # The steps, in terms of a layout's passes.
 STEPS = r"""
@@ -297,6 +319,7 @@ for (long long n = (long long)first_step * division_; n < past; ++n) {
     const double now = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
     kick_begin = EULER || start ? now : now - part;
     kick_end = EULER ? now + exact_dt : now + part;
+    begin_step(now);
     if (EULER) euler();
     else kick_and_drift(false, time, start, !CHIN4);
     if (LEDGER) enter_work(time);
@@ -304,6 +327,7 @@ for (long long n = (long long)first_step * division_; n < past; ++n) {
     if (CHIN4) {
         kick_begin = kick_end;
         kick_end = now + exact_dt - part;
+        middle_of_step(now + 0.5 * exact_dt);
         gradient_shift();
         if (LEDGER) enter_work(GRADIENT_KICK);
         kick_and_drift(true, GRADIENT_KICK, false, true);
@@ -358,6 +382,13 @@ for (int i = 0; i < M; ++i) F[i] = Vec{zero, zero, zero};
 kick_end = now;
 kick_begin = now - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
 if (OUTER) gather_outer(x);
+consult_timetable(now);
+if (DASHPOTS && step > 0) {
+    auto rows = [&](const Vec* at, auto move) {
+        for (int i = 0; i < M; ++i) move(i, row_force(at, i, sine, cosine));
+    };
+    find_rates(x, FIRST_KICK, EULER, rows);
+}
 for (int i = 0; i < M; ++i) {
     const Vec f = row_force(x, i, sine, cosine);
     const Sum here = sum_of(x, low_x, i);
@@ -379,13 +410,15 @@ for (int i = 0; i < M; ++i) {
 }
 for (int c = 0; c < 3; ++c) com[c] = center[c] / total_mass;
 if (LEDGER) {
-    if (ACTUATED && !EULER && step > 0) ledger[0] += power * FIRST_KICK;
+    if ((ACTUATED || TIMETABLE) && !EULER && step > 0) ledger[0] += power * FIRST_KICK;
+    if (DASHPOTS && !EULER && step > 0) ledger[5] += dash_power * FIRST_KICK;
     for (int i = 0; i < M; ++i) {
         const Vec a = seen_here[i];
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = seen_here[partner[s]];
-            springs += spring_energy(squared_length(b.x - a.x, b.y - a.y, b.z - a.z),
-                                     stiffness(s), half_rest_force(s, sine, cosine));
+            const real length2 = squared_length(b.x - a.x, b.y - a.y, b.z - a.z);
+            springs += SPECIAL ? special_energy(length2, s)
+                : spring_energy(length2, stiffness(s), half_rest_force(s, sine, cosine));
         }
     }
     energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;

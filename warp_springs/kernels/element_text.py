@@ -1,6 +1,6 @@
 """The elements of a bundle's robots as the lanes see them: C++ text between arrays and law."""
 
-__all__ = ["OWN_OF"]
+__all__ = ["OWN_OF", "RATES"]
 
 OWN_OF = r"""
 const int* const outer_mass = model.outer_masses.data + outer_list_;
@@ -51,5 +51,32 @@ auto own_of = [=](int i) __attribute__((always_inline)) -> Own {
         own.radius = b[9];
     }
     return own;
+};
+"""
+
+# The dashpots act within the kicks, by the midpoint rule: their forces are those at velocities that
+# half of the kick has changed already.
+RATES = r"""
+Vec* const before_v = (Vec*)(outer + (OUTER ? M : 0));
+Vec* const middle_v = before_v + M;
+auto find_rates = [&](const Vec* where, scalar time, bool start, auto sweep) {
+    const real kept = power;
+    for (int i = 0; i < M; ++i) {
+        Sum u = sum_of(v, low_v, i);
+        Losses losses = {};
+        if (!start) lose_before(u, in_world(sum_of(x, low_x, i)), w[i], own_of(i), losses);
+        before_v[i] = u;
+    }
+    rate_v = before_v;
+    if (!EULER) {
+        sweep(where, [&](int i, Vec f) {
+            const Vec at = in_world(sum_of(x, low_x, i));
+            const Vec a = kick_acceleration(f, at, w[i], own_of(i));
+            middle_v[i] = before_v[i] + scaled(a, zero + time * scalar(0.5));
+        });
+        rate_v = middle_v;
+    }
+    power = kept;
+    dash_power = zero;
 };
 """

@@ -168,6 +168,7 @@ def passes(features: GatherFeatures) -> str:
     lines = [f"const int {name} = {value};" for name, value in sizes.items()]
     lines += [f"const scalar {name} = run.{name};" for name in CONSTANTS]
     lines += ["const double exact_dt = run.exact_dt;"]
+    lines += ["auto begin_step = [](double) {}; auto middle_of_step = begin_step;"]
     lines += ["const double *const obstacles = nullptr, *const heights = nullptr;"]
     if features.vector:
         dialect = vector_dialect(features.precision, features.width)

@@ -39,8 +39,8 @@ def scratch_size(features: Features, masses: int, springs: int) -> int:
     A force, where the gradient kick of chin4 looks, and the impulse it leaves over for friction,
     for each mass and lane; more where a robot's own springs are the lanes.
     """
-    outer = 3 if features.traits.outer else 0
-    lanes = (6 + max(1, features.obstacles) + outer) * masses * features.width
+    others = (3 if features.traits.outer else 0) + (6 if features.traits.dashpots else 0)
+    lanes = (6 + max(1, features.obstacles) + others) * masses * features.width
     strand = strand_scratch(features, masses, springs) if features.width == 1 else 0
     return max(lanes, strand)
 
@@ -103,7 +103,8 @@ auto sweep = [&](const Vec* where, auto move) __attribute__((always_inline)) {
 
 // Work of the breathing springs: their power at the instant of a kick, for the kick's time.
 auto enter_work = [&](scalar time) __attribute__((always_inline)) {
-    if (ACTUATED) { ledger[0] += power * time; power = zero; }
+    if (ACTUATED || TIMETABLE) { ledger[0] += power * time; power = zero; }
+    if (DASHPOTS) { ledger[5] += dash_power * time; dash_power = zero; }
 };
 
 // One kick by the springs, as they pull at x or where the gradient kick looks, and its drift.
@@ -111,6 +112,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
     const Vec* const where = shifted ? shifted_x : x;
     if (OUTER) gather_outer(where);
+    if (DASHPOTS) find_rates(where, time, start, sweep);
     sweep(where, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         real rest = CHIN4 && GROUND && last ? left_over[i] : zero;
@@ -120,15 +122,18 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
         keep_sum(x, low_x, i, a);
         keep_sum(v, low_v, i, u);
     });
+    if (LEDGER && DASHPOTS && shifted) { ledger[5] += dash_power * time; dash_power = zero; }
 };
 auto gradient_shift = [&]() __attribute__((always_inline)) {
     if (OUTER) gather_outer(x);
+    if (DASHPOTS) rate_v = nullptr;
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         shifted_x[i] = shifted_position(sum_of(x, low_x, i), f, w[i], own_of(i));
     });
 };
 auto euler = [&]() __attribute__((always_inline)) {
     if (OUTER) gather_outer(x);
+    if (DASHPOTS) find_rates(x, dt, true, sweep);
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         move_mass_euler(a, u, f, w[i], ledger, own_of(i));
@@ -143,6 +148,12 @@ auto end = []() {};
 """
 
 _NO_LEDGER = "auto enter_work = [](scalar) {};"
+
+# What else happens in a step.
+_CLOCK = r"""
+auto begin_step = [&](double now) { wear(now); consult_timetable(now); };
+auto middle_of_step = [&](double now) { consult_timetable(now); };
+"""
 
 
 @functools.cache
@@ -159,7 +170,7 @@ def kernels(features: Features) -> Kernels:
     strand = features.width == 1 and not features.ledger and features.traits == PLAIN
     passes = strand_passes(features.precision) + _NO_LEDGER if strand else _PASSES
 
-    @wp.func_native(common + CONTROL + passes + STEPS)
+    @wp.func_native(common + CONTROL + passes + _CLOCK + STEPS)
     def advance_bundle(
         model: Model,
         state: State,

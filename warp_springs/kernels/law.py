@@ -27,6 +27,7 @@ import math
 
 from warp_springs.kernels.obstacles import MEETING, TOUCHING
 from warp_springs.kernels.own import BINDING, OWN
+from warp_springs.kernels.springs import SPRINGS
 
 __all__ = ["CONSTANTS", "DRIFTS", "EVALUATIONS", "LAW", "constants"]
 
@@ -198,6 +199,9 @@ auto breathing_rate = [=](real hs, real hc, real sine, real cosine, real omega)
     return (hs * cosine - hc * sine) * omega;
 };
 
+"""
+    + SPRINGS
+    + r"""
 // Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
 // square overflows must not come out as rest: it turns into NaN, which the health check sees.
 auto drag_flow = [=](Vec& v, real w, real ch) __attribute__((always_inline)) {

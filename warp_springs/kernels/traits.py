@@ -15,11 +15,25 @@ class Traits:
         outer: Pushes or tethers.
         skin: Friction or stiffness of contact of single masses.
         bound: Constraints.
+        harmonics: How many beyond the first.
+        own_omegas: An angular frequency of each spring.
+        curved: A cubic term, or hinges.
+        hinges: How many of a spring.
+        dashpots: Damping of springs.
+        limits: Breaking or yielding.
+        timetable: Stiffness and rest length in time.
     """
 
     outer: bool = False
     skin: bool = False
     bound: bool = False
+    harmonics: int = 0
+    own_omegas: bool = False
+    curved: bool = False
+    hinges: int = 0
+    dashpots: bool = False
+    limits: bool = False
+    timetable: bool = False
 
     @property
     def name(self) -> str:
