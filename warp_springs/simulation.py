@@ -105,6 +105,7 @@ class Simulation:
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
+        self._underway: tuple | None = None
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
         layout_of = functools.partial(choose, layout, place, precision)
@@ -166,13 +167,33 @@ class Simulation:
         tapes = [Tape(s, self._batch.slots, recorded, frame_steps, energy) for s in self._slices]
 
         started = time.perf_counter()
+        self._underway = (first, recorded, tapes, started)
         try:
             run_all(tapes, first, last, self.threads, progress)
         except BaseException:
             self._interrupted = True
             raise
+        finally:
+            self._underway = None
         self._step = last
         return self._result(first, frame_steps, recorded, tapes, time.perf_counter() - started)
+
+    def so_far(self) -> Result | None:
+        """The frames that the run under way has recorded up to now, for whoever is watching it.
+
+        To be called by ``progress``; ``None`` where there is no run, or no frame of every robot
+        yet. Frames, times and energies are final; the state "at the end" is that of the moment,
+        which no two robots need to share.
+        """
+        if self._underway is None:
+            return None
+        first, recorded, tapes, started = self._underway
+        count = min(tape.taken for tape in tapes)
+        if not count:
+            return None
+        steps = tapes[0].frame_steps[:count]
+        short = [tape.cut_to(count) for tape in tapes]
+        return self._result(first, steps, recorded, short, time.perf_counter() - started)
 
     def _allocate(self) -> dict[str, np.ndarray]:
         """Every buffer of the kernels by name: the packed ones, and what is written."""

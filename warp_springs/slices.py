@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -126,6 +127,7 @@ class Tape:
         frames: Their positions [m], flat, shape (F, 3 * sum of M).
         energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
         done: Steps done so far.
+        taken: Frames taken so far.
     """
 
     slice: Slice | Crowd
@@ -134,6 +136,7 @@ class Tape:
     frame_steps: Sequence[int]
     energy: bool
     done: int = 0
+    taken: int = 0
     members: np.ndarray = field(init=False)
     frames: np.ndarray = field(init=False)
     energies: np.ndarray = field(init=False)
@@ -161,6 +164,7 @@ class Tape:
             at = self._advance(first, at, step, stop)
             self.slice.observe(step, self._which)
             self._take(index)
+            self.taken = index + 1
         at = self._advance(first, at, last, stop)
         if not stop.is_set():
             self.slice.observe(last)
@@ -180,6 +184,13 @@ class Tape:
             self.frames[index] = buffers["seen_positions"][self._state]
         if self.energy:
             self.energies[index] = buffers["seen_energies"][self._lanes]
+
+    def cut_to(self, frames: int) -> Tape:
+        """A tape of the first frames alone; they are complete once they are ``taken``."""
+        short = copy.copy(self)
+        short.frame_steps = self.frame_steps[:frames]
+        short.frames, short.energies = self.frames[:frames], self.energies[:frames].copy()
+        return short
 
     def frames_by_robot(self) -> dict[int, np.ndarray]:
         """Frames (F, M, 3) of each recorded robot."""

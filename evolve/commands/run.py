@@ -61,11 +61,13 @@ class Run:
 
     def __call__(self, console: Console) -> int:
         """Make the folder, and evolve."""
+        import warp_springs as ws
         from evolve.run import Run as RunFolder
         from evolve.run import create_seeds
         from evolve.toml import load, parse_settings
 
-        _ = self.extras.place  # a bad address is refused before a folder is made
+        if self.extras.live:
+            ws.LiveServer.place(self.extras.live_at)  # refused before a folder is made
         flags = {
             "seed": self.seed,
             "generations": self.generations,

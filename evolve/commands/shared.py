@@ -40,20 +40,6 @@ class Extras:
     csv: Flag = False
     """Also write record.csv at the end: every evaluation as a row."""
 
-    @property
-    def place(self) -> tuple[str, int]:
-        """Address and port of the page.
-
-        Raises:
-            ValueError: They are not given as ADDRESS:PORT.
-        """
-        address, _, port = self.live_at.rpartition(":")
-        if not address or not port.isdecimal():
-            raise ValueError(
-                f"--live-at {self.live_at}: expected ADDRESS:PORT, as in 127.0.0.1:8000"
-            )
-        return address.strip("[]"), int(port)
-
 
 def evolve_to_the_end(
     together: Sequence[runs.Run], console: Console, extras: Extras = Extras()
@@ -103,7 +89,7 @@ def _live(
     from evolve.live import Live
 
     title = f"{together[0].config.name} is evolving"
-    server = stack.enter_context(ws.LiveServer(title, *extras.place))
+    server = stack.enter_context(ws.LiveServer(title, *ws.LiveServer.place(extras.live_at)))
     console.print(f"[dim]live    [/]{server.url}", highlight=False, soft_wrap=True)
     return [Live(together, server).update]
 

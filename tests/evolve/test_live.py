@@ -62,7 +62,9 @@ def test_a_run_is_seen_while_it_goes_on_and_no_longer(tmp_path):
 def test_a_bad_address_is_one_clear_line(shell, tmp_path):
     done = shell("run", "cube", "--live", "--live-at", "here", *flags())
     assert done.returncode == 1
-    assert done.stderr == "evolve: --live-at here: expected ADDRESS:PORT, as in 127.0.0.1:8000\n"
+    assert done.stderr == (
+        "evolve: 'here' is no place to serve: expected ADDRESS:PORT, as in 127.0.0.1:8000\n"
+    )
     assert not (tmp_path / "runs").exists()
     done = shell("run", "cube", "--live", "--live-at", "192.0.2.1:0", "--out", "b", *flags())
     assert done.returncode == 1 and "cannot serve on 192.0.2.1 port 0" in done.stderr

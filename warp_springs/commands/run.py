@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import FlagCreatePairsOff, Positional, arg
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,14 +38,20 @@ class RunCommand:
     """Folder to write to; made if it is missing."""
     set: Annotated[tuple[str, ...], arg(metavar="KEY=VALUE ...", help_behavior_hint="")] = ()
     """Keys of the scene by their full names, values as in TOML."""
-
+    live: FlagCreatePairsOff[bool] = False
+    """Serve a page with the frames so far and a curve while it runs, to this machine only; its
+    address is printed."""
+    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = "127.0.0.1:0"
+    """Where to serve it; port 0 takes one that is free."""
     keys: bool = False
     """Print all keys with their defaults and what they mean instead."""
 
     def run(self, console: Console) -> int:
         """Simulate, write, and say what was written."""
+        from warp_springs.commands.live import watching
         from warp_springs.commands.scenes import simulated, write_and_say
         from warp_springs.config import SceneFile, load_scene, parse_settings, reference
+        from warp_springs.view.live import LiveServer
 
         if self.keys:
             print(reference(SceneFile), end="")
@@ -53,6 +60,8 @@ class RunCommand:
             print("warp-springs run: SCENE.toml is missing; --help explains", file=sys.stderr)
             return 2
         config = load_scene(self.scene, parse_settings(self.set))
-        result = simulated(config, console)
+        place = LiveServer.place(self.live_at)
+        with watching(config, place, console) if self.live else nullcontext() as watch:
+            result = simulated(config, console, watch)
         write_and_say(config, result, self.out, console)
         return 3 if result.status.any() else 0

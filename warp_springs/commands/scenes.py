@@ -10,19 +10,26 @@ from typing import TYPE_CHECKING
 from warp_springs.commands.progress import progress
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
     from warp_springs.config import SceneFile
     from warp_springs.result import Result
+    from warp_springs.simulation import Simulation
 
 __all__ = ["print_rows", "simulated", "write_and_say"]
 
 
-def simulated(config: SceneFile, console: Console) -> Result:
-    """Simulate a scene file with a bar that shows the progress."""
+def simulated(
+    config: SceneFile,
+    console: Console,
+    watch: Callable[[Simulation, float], None] | None = None,
+) -> Result:
+    """Simulate a scene file with a bar that shows the progress; `watch` as in `SceneFile.run`."""
     console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
     with progress(console, "simulating") as advance:
-        return config.run(advance)
+        return config.run(advance, watch)
 
 
 def write_and_say(

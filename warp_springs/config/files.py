@@ -116,15 +116,33 @@ class SceneFile(Section):
         except (ValueError, TypeError, NotImplementedError) as error:
             raise ConfigError(f"{self._source}simulation: {error}") from None
 
-    def run(self, progress: Callable[[float], None] | None = None) -> Result:
-        """Simulate it. Raises ConfigError."""
+    def run(
+        self,
+        progress: Callable[[float], None] | None = None,
+        watch: Callable[[Simulation, float], None] | None = None,
+    ) -> Result:
+        """Simulate it.
+
+        Args:
+            progress: Called now and then with the share that is done, 0 to 1.
+            watch: Called as often, with the simulation too: `Simulation.so_far` gives the frames.
+
+        Raises:
+            ConfigError: Something in the file does not fit.
+        """
         simulation, record = self.make_simulation(), self.record
         if wrong := [i for i in record.robots or () if not 0 <= i < len(simulation.robots)]:
             count = len(simulation.robots)
             raise ConfigError(f"{self._source}record.robots: {wrong[0]} given, there are {count}")
-        return simulation.run(
-            self.simulation.duration, record.fps, record.robots, record.energy, progress
-        )
+
+        def advance(done: float) -> None:
+            if progress is not None:
+                progress(done)
+            if watch is not None:
+                watch(simulation, done)
+
+        duration = self.simulation.duration
+        return simulation.run(duration, record.fps, record.robots, record.energy, advance)
 
 
 def load_scene(

@@ -146,6 +146,19 @@ class LiveServer:
             state = json.loads(self._content.state)
             self._content.state = _packed(state | {"page": self._content.version})
 
+    @staticmethod
+    def place(text: str) -> tuple[str, int]:
+        """Read ADDRESS:PORT, for the arguments of a server.
+
+        Raises:
+            ValueError: It is something else.
+        """
+        address, _, port = text.rpartition(":")
+        if not address or not port.isdecimal():
+            raise ValueError(f"{text!r} is no place to serve: expected ADDRESS:PORT, as in "
+                             "127.0.0.1:8000")  # fmt: skip
+        return address.strip("[]"), int(port)
+
     def close(self) -> None:
         """Stop serving."""
         self._server.shutdown()
