@@ -204,10 +204,12 @@ class Batch:
                 (alone[robots[cohort].is_actuated] if lanes else by_hand).append(cohort)
                 continue
             layout, traits = self._layout_of(int(cohort.masses[0])), traits_of(cohort.elements)
-            if traits != PLAIN:
-                layout = "lanes"
-            if layout == "flat":  # laid out by its own shape, not by that of the first of many
+            # A flat body is laid out by its own shape, not by that of the first of many.
+            if layout == "flat" and traits == PLAIN:
                 by_hand += cohort.ids.tolist()
+                continue
+            if layout == "flat":
+                gathered += [cohort.take(np.array([i])) for i in range(len(cohort.ids))]
                 continue
             if layout == "block":
                 gathered.append(cohort)
@@ -228,7 +230,7 @@ class Batch:
             gathered.append(Strip.ragged(by_hand, [robots[i] for i in by_hand]))
         for cohort in gathered:
             for (actuated, layout), strip in self._gathered(cohort, robots):
-                strips[1, actuated, layout, PLAIN].append(strip)
+                strips[1, actuated, layout, traits_of(cohort.elements)].append(strip)
         return strips
 
     def _gathered(

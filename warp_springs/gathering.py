@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_springs.kernels.buffers import BUNDLE
+from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE
 from warp_springs.kernels.gather import GatherFeatures, lane_order
 
 __all__ = ["Bodies", "Lists", "arrays", "ranges"]
@@ -210,11 +210,18 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
     quads[lists.slot, :3] = positions
     quads[lists.slot, 3] = bodies.values("inverse_masses", "mass", masses)
 
-    def by_lane(name: str) -> np.ndarray:
-        values = bodies.values(name, "state", 3 * masses).reshape(-1, 3)
+    def by_lane(name: str, column: str = "state", columns: int = 3) -> np.ndarray:
+        values = bodies.values(name, column, columns * masses).reshape(-1, columns)
         return _by_lane(values, lists, features)
 
-    mixed = {}
+    mixed, traits = {}, features.traits
+    own = {"obstacles": bodies.buffers["obstacles"], "heights": bodies.buffers["heights"]}
+    if traits.skin:
+        own["skins"] = by_lane("skins", "skin")
+    if traits.bound:
+        own["bonds"] = by_lane("bonds", "bond", 10)
+    if traits.outer:
+        own |= _outer(bodies, lists, features)
     if features.precision == "mixed":
         for name in ("low_positions", "low_velocities"):
             mixed[name] = mixed[f"good_{name}"] = by_lane(name)
@@ -236,24 +243,50 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         "velocities": by_lane("velocities"),
         "good_positions": by_lane("positions"),
         "good_velocities": by_lane("velocities"),
-        "rests": np.zeros(len(lists.home)),
-        "ledgers": np.zeros(4 * len(lists.home)),
-        "good_ledgers": np.zeros(4 * len(lists.home)),
+        "rests": np.zeros(max(1, features.obstacles) * len(lists.home)),
+        "ledgers": np.zeros(len(ACCOUNTS) * len(lists.home)),
+        "good_ledgers": np.zeros(len(ACCOUNTS) * len(lists.home)),
         "oscillators": np.stack([waves[:, :2], waves[:, :2]]),
         "states": bodies.values("states", "lane", one),
         "state_times": np.zeros(n),
         "flags": np.zeros(2 * n, np.int32),
         **mixed,
+        **own,
     }
 
 
 def _by_lane(values: np.ndarray, lists: Lists, features: GatherFeatures) -> np.ndarray:
-    """Vectors (masses, 3) as [slice][3][lane]; padding is zero."""
+    """Values (masses, n) as [slice][n][lane]; padding is zero."""
     width = features.width
-    table = np.zeros((len(lists.home) // width, 3, width), values.dtype)
+    table = np.zeros((len(lists.home) // width, values.shape[1], width), values.dtype)
     lane = np.array(lane_order(features))[lists.slot % width]
     table[lists.slot // width, :, lane] = values
     return table
+
+
+def _outer(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, np.ndarray]:
+    """Pushes and tethers of each mass, in rows for each slice, as the springs are."""
+    table, width = bodies.table, features.width
+    counts = table["pushes"] + table["tethers"]
+    masses = bodies.masses[bodies.topology]
+    mass = bodies.buffers["outer_masses"][ranges(table["outer_list"], counts)]
+    slot = lists.slot[mass + np.repeat(np.cumsum(masses) - masses, counts)]
+    is_tether = ranges(0 * counts, counts) >= np.repeat(table["pushes"], counts)
+    each = bodies.buffers["outer_values"][ranges(table["outer"], 5 * counts)].reshape(-1, 5)
+    each = np.concatenate([each, is_tether[:, None]], axis=1)
+    windows = bodies.buffers["outer_windows"][ranges(table["window"], 2 * counts)].reshape(-1, 2)
+
+    per_slot = np.bincount(slot, minlength=len(lists.home))
+    length = per_slot.reshape(-1, width).max(axis=1)
+    first_row = np.cumsum(length) - length
+    rank = np.empty(len(slot), np.int64)
+    rank[np.argsort(slot, kind="stable")] = ranges(0 * per_slot, per_slot)
+    row, lane = first_row[slot // width] + rank, np.array(lane_order(features))[slot % width]
+    found = {"outer_sites": np.stack([first_row, length], axis=1)}
+    for name, values in {"outer_values": each, "outer_windows": windows}.items():
+        found[name] = np.zeros((length.sum(), values.shape[1], width))
+        found[name][row, :, lane] = values
+    return found
 
 
 def _homes(lists: Lists, features: GatherFeatures) -> np.ndarray:

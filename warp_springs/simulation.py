@@ -96,7 +96,7 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
-        needs = needs_lanes(self.robots, self.scene)
+        needs = needs_lanes(self.robots)
         if needs and (layout not in ("auto", "lanes") or not place.is_cpu):
             raise NotImplementedError(f"{needs}: for the layout 'lanes' on a CPU so far")
         layout = "lanes" if needs else layout

@@ -11,6 +11,19 @@ from warp_springs.variants import Variants
 
 __all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
 
+#: Springs that only the lanes know.
+SPRING_ELEMENTS = (
+    "harmonics",
+    "omegas",
+    "cubic",
+    "slope",
+    "hinges",
+    "dashpot",
+    "breaks",
+    "yields",
+    "timetable",
+)
+
 
 def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     """The elements of robots, each structure once or more."""
@@ -18,11 +31,13 @@ def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     return [robot.elements for robot in some if robot.elements is not NONE]
 
 
-def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
+def needs_lanes(robots: Sequence[Robot]) -> str:
     """What only the layout "lanes" can do here, in words; empty if nothing."""
-    if scene.obstacles:
-        return "Scene.obstacles"
-    return next(map(repr, elements_of(robots)), "")
+    for elements in elements_of(robots):
+        for name in SPRING_ELEMENTS:
+            if getattr(elements, name) is not None:
+                return f"Elements.{name}"
+    return ""
 
 
 def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:

@@ -34,6 +34,25 @@ CASES = {
         ws.Scene(ground=ws.Ground(static_friction=0.6, kinetic_friction=0.4), damping=0.1),
         True,
     ),
+    "elements": (
+        {"integrator": "chin4", "precision": "float64"},
+        ws.Scene(
+            ground=ws.Ground(),
+            obstacles=(
+                ws.Sphere(center=(0.1, 0.1, -0.05), radius=0.1),
+                ws.Plane(normal=(0.2, 0.0, 1.0), offset=0.001),
+            ),
+            wind=(1.0, 0.5, 0.0),
+            water=ws.Water(level=0.03, density=0.5, drag=0.2),
+            drag=0.01,
+        ),
+        True,
+    ),
+    "held": (
+        {"integrator": "leapfrog", "precision": "float32"},
+        ws.Scene(ground=ws.Ground(static_friction=0.3, kinetic_friction=0.2)),
+        False,
+    ),
     "free": (
         {"integrator": "chin4", "precision": "float32"},
         ws.Scene(ground=None, gravity=(0, 0, 0)),
@@ -88,7 +107,17 @@ def population(case):
     robots = bodies(CASES[case][2])
     if case == "far":
         return [robot.moved((1000, -500, 0)).moving((20, -10, 0)) for robot in robots]
+    if case in ("elements", "held"):
+        return [with_elements(robot) for robot in robots]
     return robots
+
+
+def with_elements(robot):
+    """Pushed, tethered, held on a line and on a circle, rough in places."""
+    robot = robot.pushed([1, 3], (2, 1, 0.5), start=0.013, duration=0.04)
+    robot = robot.pushed([3], (0, -1, 0), start=0.02).tethered(0, 200.0, point=(0, 0, 0.3))
+    robot = robot.fixed([2], "x").held_to(ws.Sphere(robot.positions[5], 0.05), [4])
+    return robot.shod(static_friction=0.1, kinetic_friction=0.05, masses=[6, 7])
 
 
 @functools.cache

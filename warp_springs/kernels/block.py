@@ -48,7 +48,8 @@ Sum velocity = load_sum(state.velocities.data, state.low_velocities.data, outsid
 look_up_origin(robot);
 if (inside) { keep_quad(now(), at, x_start, weight); keep_quad(then(), at, x_start, weight); }
 scalar sine = state.oscillators.data[2 * robot], cosine = state.oscillators.data[2 * robot + 1];
-real rest = zero, power = zero;
+real rest[OBSTACLES ? OBSTACLES : 1] = {};
+real power = zero;
 bool moving = is_mass && state.states.data[robot] == 0;
 meet();
 

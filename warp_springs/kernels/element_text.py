@@ -10,15 +10,10 @@ const Vec* const skins = (const Vec*)(model.skins.data + skin_);
 const real* const bonds = (const real*)(model.bonds.data + bond_);
 Vec* const outer = (Vec*)(left_over + (OBSTACLES ? OBSTACLES : 1) * M);
 
-// The part of the present kick's time in which a push or a tether acts: so its impulse is exact.
 auto acting = [&](int e) __attribute__((always_inline)) -> real {
+    const double* const window = outer_window + 2 * W * e;
     real part = zero;
-    for (int l = 0; l < W; ++l) {
-        const double start = outer_window[2 * W * e + l], end = outer_window[2 * W * e + W + l];
-        const double from = start > kick_begin ? start : kick_begin;
-        const double to = end < kick_end ? end : kick_end;
-        set_lane(part, l, scalar(to > from ? (to - from) / (kick_end - kick_begin) : 0));
-    }
+    for (int l = 0; l < W; ++l) set_lane(part, l, acting_part(window[l], window[W + l]));
     return part;
 };
 // Forces of pushes, and of tethers where the masses are at x.
@@ -30,10 +25,7 @@ auto gather_outer = [&](const Vec* x) {
         const int i = outer_mass[e];
         const real* const o = outer_value + 5 * e;
         Vec f = {o[0], o[1], o[2]};
-        if (e >= pushes_) {
-            const Vec d = f - x[i];
-            f = scaled(d, spring_pull(dot(d, d) + TINY, o[3], o[3] * o[4] * scalar(0.5)));
-        }
+        if (e >= pushes_) f = tether_force(f - x[i], o[3], o[4]);
         outer[i] = outer[i] + scaled(f, part);
     }
 };

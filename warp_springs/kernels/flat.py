@@ -81,10 +81,8 @@ auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__(
     slices([&](Slot at) __attribute__((always_inline)) {
         Vec low = low_at(at);
         Sum v = velocity_at(at);
-        real* const rest = in_slice(state.rests.data, at, 1);
-        real left = CHIN4 && last ? *rest : zero;
-        move_slot(at, now(), then(), low, v, left, sine, cosine, shifted, time, start, last);
-        if (CHIN4 && !last) *rest = left;
+        real* const rest = in_slice(state.rests.data, at, OBSTACLES ? OBSTACLES : 1);
+        move_slot(at, now(), then(), low, v, rest, sine, cosine, shifted, time, start, last);
         keep(at, low, v);
     });
     flip();
@@ -245,15 +243,17 @@ if (leader && ACTUATED) {
 }
 if (stopped || model.homes.data[slot] < 0) return;
 Vec low = low_at(at);
+const double begin = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+kick_begin = PASS ? begin + part : EULER || n == 0 ? begin : begin - part;
+kick_end = EULER ? begin + exact_dt : PASS ? begin + exact_dt - part : begin + part;
 if (PASS == 1) shift_slot(at, now, then, low, sine, cosine);
 else {
     const bool start = PASS == 0 && n == 0, last = !CHIN4 || PASS == 2;
     const scalar time = EULER ? dt : PASS == 2 ? GRADIENT_KICK
         : start ? FIRST_KICK : FIRST_KICK * scalar(2);
     Sum v = velocity_at(at);
-    real rest = CHIN4 && last ? state.rests.data[slot] : zero;
+    real* const rest = state.rests.data + (OBSTACLES ? OBSTACLES : 1) * (long long)slot;
     move_slot(at, now, then, low, v, rest, sine, cosine, PASS == 2, time, start, last);
-    if (CHIN4 && !last) state.rests.data[slot] = rest;
     keep(at, low, v);
 }
 """

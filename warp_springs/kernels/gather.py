@@ -24,7 +24,14 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warp_springs.kernels.buffers import REAL, array_struct, real_dtype, real_type, struct_of
+from warp_springs.kernels.buffers import (
+    ENERGIES,
+    REAL,
+    array_struct,
+    real_dtype,
+    real_type,
+    struct_of,
+)
 from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.dialect import (
     native_width,
@@ -73,7 +80,7 @@ SITE = (
 CHUNK = ("robot", "first", "count")
 
 #: Values that are summed over the masses of a robot: mass, its moments, the energies, the ledger.
-LOOKS = 12
+LOOKS = 4 + ENERGIES
 
 #: What stays as it was packed; see ``kernels.buffers`` for the notation.
 MODEL = {
@@ -86,6 +93,13 @@ MODEL = {
     "omegas": np.float64,  # rad/s
     "turns": REAL,  # cos(w dt), sin(w dt) of half a step of chin4, or of a step
     "reaches2": REAL,  # square of the length that stops a robot, m^2
+    "obstacles": np.float64,  # see kernels.buffers
+    "heights": np.float64,
+    "outer_sites": np.int32,  # first row and rows of the pushes and tethers of each slice
+    "outer_values": REAL,  # [row][6][slot], the last: whether it is a tether
+    "outer_windows": np.float64,  # [row][2][slot], s
+    "skins": REAL,  # [slice][3][slot]
+    "bonds": REAL,  # [slice][10][slot]
     "quanta": REAL,  # in which the origin of a robot moves, m; in mixed precision
 }
 #: What stepping changes.
@@ -102,8 +116,8 @@ STATE = {
     "good_low_velocities": REAL,
     "origins": np.float64,  # m
     "shifts": REAL,  # m
-    "rests": REAL,  # impulse left over for friction, within a step of chin4
-    "ledgers": REAL,  # [slice][4][slot], J
+    "rests": REAL,  # impulse left over for friction by each surface, within a step of chin4
+    "ledgers": REAL,  # [slice][ACCOUNTS][slot], J
     "good_ledgers": REAL,
     "oscillators": REAL,  # two buffers of sin(wt), cos(wt) for each robot
     "states": np.int32,  # Status
@@ -169,7 +183,8 @@ def passes(features: GatherFeatures) -> str:
     lines += [f"const scalar {name} = run.{name};" for name in CONSTANTS]
     lines += ["const double exact_dt = run.exact_dt;"]
     lines += ["auto begin_step = [](double) {}; auto middle_of_step = begin_step;"]
-    lines += ["const double *const obstacles = nullptr, *const heights = nullptr;"]
+    lines += ["const double* const obstacles = model.obstacles.data;"]
+    lines += ["const double* const heights = model.heights.data;"]
     if features.vector:
         dialect = vector_dialect(features.precision, features.width)
         loads = quad_operations(features.width) + _vector_loads(features.width)
@@ -360,19 +375,56 @@ auto choose_sum = [=](mask m, const Sum& a, const Sum& b) __attribute__((always_
 auto choose_sum = choose;
 #endif
 
-// Energies that a mass exchanged, kept by mass: work, damping, drag, friction.
-struct Accounts { real values[4]; };
+// Energies that a mass exchanged, kept by mass.
+struct Accounts { real values[ACCOUNTS]; };
 auto open_accounts = [=](scalar* kept, Slot at) __attribute__((always_inline)) -> Accounts {
     Accounts accounts = {};
-    for (int e = 0; LEDGER && e < 4; ++e) accounts.values[e] = in_slice(kept, at, 4)[e * STRIDE];
+    for (int e = 0; LEDGER && e < ACCOUNTS; ++e)
+        accounts.values[e] = in_slice(kept, at, ACCOUNTS)[e * STRIDE];
     return accounts;
 };
 auto close_accounts = [=](scalar* kept, Slot at, Accounts accounts)
         __attribute__((always_inline)) {
-    for (int e = 0; LEDGER && e < 4; ++e) in_slice(kept, at, 4)[e * STRIDE] = accounts.values[e];
+    for (int e = 0; LEDGER && e < ACCOUNTS; ++e)
+        in_slice(kept, at, ACCOUNTS)[e * STRIDE] = accounts.values[e];
 };
 
-// The reasons, as bits of REASONS, why the robot of a slot must be stopped.
+// Force of the pushes on a mass at x, and of its tethers, each for the part of the present kick's
+// time in which it acts.
+auto outer_force = [&](Slot at, Vec x) __attribute__((always_inline)) -> Vec {
+    Vec sum = {zero, zero, zero};
+    const int* const site = model.outer_sites.data + 2 * at.slice;
+    for (int row = site[0]; row < site[0] + site[1]; ++row) {
+        const double* const window =
+            model.outer_windows.data + 2 * (long long)row * SLICE + at.lane;
+        real part = zero;
+        for (int l = 0; l < W; ++l)
+            set_lane(part, l, acting_part(window[l], window[SLICE + l]));
+        if (!any(part > zero)) continue;
+        const real* const o = in_slice(model.outer_values.data, Slot{row, at.lane, 0, 0, 0}, 6);
+        const Vec f = {o[0], o[STRIDE], o[2 * STRIDE]};
+        const Vec pull = tether_force(f - x, o[3 * STRIDE], o[4 * STRIDE]);
+        sum = sum + scaled(pick(o[5 * STRIDE] > zero, pull, f), part);
+    }
+    return sum;
+};
+// What the mass of a slot has of its own; x is where its forces are taken.
+auto own_of = [&](Slot at, Vec x, real* left_over) __attribute__((always_inline)) -> Own {
+    Own own = {};
+    own.left_over = left_over;
+    if (OUTER) own.outer = outer_force(at, x);
+    if (SKIN) own.skin = load(model.skins.data, at);
+    if (BOUND) {
+        const real* const b = in_slice(model.bonds.data, at, 10);
+        own.diagonal = Vec{b[0], b[STRIDE], b[2 * STRIDE]};
+        own.corner = Vec{b[3 * STRIDE], b[4 * STRIDE], b[5 * STRIDE]};
+        own.centre = Vec{b[6 * STRIDE], b[7 * STRIDE], b[8 * STRIDE]};
+        own.radius = b[9 * STRIDE];
+    }
+    return own;
+};
+
+// The reasons, as bits, why the robot of a slot must be stopped.
 auto trouble = [=](Slot at, const scalar* where, Vec low, Vec v)
         __attribute__((always_inline)) -> int {
     real w;
@@ -384,7 +436,8 @@ auto trouble = [=](Slot at, const scalar* where, Vec low, Vec v)
         const Vec d = b - a;
         stretched |= squared_length(d.x, d.y, d.z) > reach2;
     });
-    const bool deep = GROUND && any(in_world(sum_of(&a, &low, 0)).z < -depth_limit);
+    bool deep = GROUND && any(in_world(sum_of(&a, &low, 0)).z < -depth_limit);
+    if (OBSTACLES) deep = any((w > zero) & (depth_in_obstacles(a) > zero + depth_limit));
     return (deep ? 1 : 0) | (any(stretched) ? 2 : 0) | (any(fast) ? 4 : 0)
         | (any(poison_of(a, v) != zero) ? 8 : 0);
 };
@@ -439,7 +492,8 @@ auto settle = [=](Slot at, bool stop, scalar* one, scalar* other, Vec& low, Sum&
 };
 // One kick by the springs and its drift, from the positions `now` into the buffer `then`, which
 // holds the positions if the springs pull where the gradient kick looks.
-auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v, real& rest,
+// `rest` is what each surface leaves over for friction, from one drift of a step to the next.
+auto move_slot = [&](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v, real* rest,
                      scalar sine, scalar cosine, bool shifted, scalar time, bool start, bool last)
         __attribute__((always_inline)) {
     real w;
@@ -450,10 +504,14 @@ auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v,
     const Sum x_before = a, v_before = v;
     Accounts accounts = open_accounts(state.ledgers.data, at);
     if (LEDGER && ACTUATED && !shifted) accounts.values[0] += sum.power * time;
-    if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values, {});
-    else
-        move_mass(a, v, sum.f, shifted ? from_here(here, a) : in_world(a), w, run.substeps, rest,
-                  time, start, last, accounts.values, {});
+    const Own own = own_of(at, here, rest);
+    if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values, own);
+    else {
+        real left = GROUND && CHIN4 && last ? *rest : zero;
+        move_mass(a, v, sum.f, shifted ? from_here(here, a) : in_world(a), w, run.substeps, left,
+                  time, start, last, accounts.values, own);
+        if (GROUND && CHIN4 && !last) *rest = left;
+    }
     close_accounts(state.ledgers.data, at, accounts);
     const mask is_mass = w > zero;
     v = choose_sum(is_mass, v, v_before);
@@ -461,7 +519,7 @@ auto move_slot = [=](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v,
     keep_sum(&x, &low, 0, choose_sum(is_mass, a, x_before));
     keep_quad(then, at, x, w);
 };
-auto shift_slot = [=](Slot at, const scalar* now, scalar* then, Vec low, scalar sine, scalar cosine)
+auto shift_slot = [&](Slot at, const scalar* now, scalar* then, Vec low, scalar sine, scalar cosine)
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
@@ -471,7 +529,8 @@ auto shift_slot = [=](Slot at, const scalar* now, scalar* then, Vec low, scalar 
         accounts.values[0] += sum.power * GRADIENT_KICK;
         close_accounts(state.ledgers.data, at, accounts);
     }
-    const Vec a = shifted_position(sum_of(&here, &low, 0), sum.f, w, {});
+    const Own own = own_of(at, here, nullptr);
+    const Vec a = shifted_position(sum_of(&here, &low, 0), sum.f, w, own);
     keep_quad(then, at, choose(w > zero, a, here), w);
 };
 

@@ -178,6 +178,17 @@ auto squared_length = [=](real x, real y, real z) __attribute__((always_inline))
 auto spring_pull = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
     return k - over_root(h, length2);
 };
+// The same for a spring of stiffness k and rest length L0 to a point, d away.
+auto tether_force = [=](Vec d, real k, real L0) __attribute__((always_inline)) -> Vec {
+    return scaled(d, spring_pull(dot(d, d) + TINY, k, k * L0 * scalar(0.5)));
+};
+// The part of the present kick's time in which what lasts from start to end acts: so its impulse is
+// exact.
+auto acting_part = [&](double start, double end) -> scalar {
+    const double from = start > kick_begin ? start : kick_begin;
+    const double to = end < kick_end ? end : kick_end;
+    return scalar(to > from ? (to - from) / (kick_end - kick_begin) : 0);
+};
 auto spring_energy = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
     real stretch_force = k * square_root(length2) - h * scalar(2);
     return stretch_force * stretch_force / k * scalar(0.5);

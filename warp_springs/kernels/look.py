@@ -51,11 +51,15 @@ const Sum u = load_sum(state.velocities.data, state.low_velocities.data, at);
 const scalar sine = state.oscillators.data[2 * ((long long)side * robots + robot)];
 const scalar cosine = state.oscillators.data[2 * ((long long)side * robots + robot) + 1];
 const real si = zero + sine, co = zero + cosine;
+const double now_time = double((long long)step) * exact_dt;
+kick_end = now_time;
+kick_begin = now_time - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+const Own own = own_of(at, a, nullptr);
 const Force sum = gather(at, shown.data, a, sine, cosine);
 Sum v = u;
 Losses losses = {};
 Accounts accounts = open_accounts(stopped ? state.good_ledgers.data : state.ledgers.data, at);
-if (!EULER && step > 0) synchronise(v, sum.f, in_world(x), w, {}, losses);
+if (!EULER && step > 0) synchronise(v, sum.f, in_world(x), w, own, losses);
 if (LEDGER && !stopped) {
     enter(accounts.values, losses, u, v, w);
     if (ACTUATED && !EULER && step > 0) accounts.values[0] += sum.power * FIRST_KICK;
@@ -70,7 +74,7 @@ if (LEDGER)
     });
 const real m = (zero + scalar(1)) / w;
 const real energies[4] = {kinetic_energy(v, m), gravity_energy(in_world(x), m), springs,
-                          contact_energy(in_world(x), {})};
+                          contact_energy(in_world(x), own)};
 Vec parts_of_x[2] = {}, parts_of_v[2] = {};
 keep_sum(parts_of_x, parts_of_x + 1, 0, x);
 keep_sum(parts_of_v, parts_of_v + 1, 0, v);
@@ -105,8 +109,9 @@ for (int l = 0; l < W; ++l) {
     }
     for (int e = 0; LEDGER && e < 4; ++e) {
         out[4 + e] = double(lane_of(energies[e], l));
-        out[8 + e] = double(lane_of(accounts.values[e], l));
     }
+    for (int e = 0; LEDGER && e < ACCOUNTS; ++e)
+        out[8 + e] = double(lane_of(accounts.values[e], l));
 }
 """
 
@@ -134,7 +139,7 @@ for (int e = 0; e < (LEDGER ? LOOKS : 4); ++e)
         total[e] += sums.data[LOOKS * (long long)c + e];
 for (int axis = 0; axis < 3; ++axis)
     seen.seen_centers.data[3 * lane + axis] = wide_scalar(total[1 + axis] / total[0]);
-for (int e = 0; LEDGER && e < 8; ++e)
+for (int e = 0; LEDGER && e < ENERGIES; ++e)
     seen.seen_energies.data[ENERGIES * lane + e] = scalar(total[4 + e]);
 const int health = state.states.data[robot];
 seen.seen_states.data[lane] = health ? health : status_of(*flag);
