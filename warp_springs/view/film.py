@@ -263,8 +263,6 @@ def _panel(
 
 def _usual_layout(result: Result, count: int) -> str:
     """How several robots are shown unless somebody says so."""
-    if getattr(result, "world", None):
-        return "world"
     return "panel" if count > 1 and result.scene.obstacles else "grid"
 
 

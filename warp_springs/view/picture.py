@@ -73,7 +73,7 @@ def render(
         layout: How several robots are shown. "grid": side by side in one world, far enough apart
             for all their motion, labels on nobody. "panel": each in a tile of its own with a
             camera of its own. "world": where they are. Default "grid", or "panel" where the scene
-            has obstacles, or "world" for robots that were simulated in one world.
+            has obstacles.
         color: "stress": bars are red where stretched, blue where compressed; full colour is the
             95th percentile of the robot's forces over the run. "material": by what they are made
             of, by stiffness without materials. "actuation": orange where told to be longer, green
