@@ -11,6 +11,7 @@ from PIL import Image
 
 import warp_springs as ws
 from warp_springs.view import appearance, video
+from warp_springs.view import film as film_module
 from warp_springs.view.actors import actors_of, between
 from warp_springs.view.camera import Camera
 from warp_springs.view.directing import Director, Setting
@@ -143,6 +144,23 @@ def test_a_bouncing_robot_does_not_shake_the_camera():
     _, man = director(result)
     heights = [man.camera(t).eye[2] for t in np.linspace(0, 1, 31)]
     assert np.ptp(heights) < 1e-9
+
+
+def test_the_camera_falls_with_what_falls_freely():
+    cube = ws.shapes.cube().moving((1.0, 0.0, 3.0))
+    result = ws.Simulation([cube], ws.Scene(ground=None)).run(1.0, fps=20)
+    actor, man = director(result)
+    for time in (0.0, 0.4, 1.0):
+        seen = man.camera(time).project(actor.positions(time).mean(axis=0)[None], SIZE)[0]
+        np.testing.assert_allclose(seen[:2], (80, 45), atol=6.0)
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "columns"),
+    [(9, (1280, 720), 3), (2, (1280, 720), 2), (25, (1280, 720), 5), (6, (450, 800), 2)],
+)
+def test_tiles_of_a_panel_have_a_good_shape(count, size, columns):
+    assert film_module._columns(count, size) == columns
 
 
 def test_the_turntable_goes_around_at_one_distance():

@@ -41,6 +41,7 @@ class Actor:
         paint: Colours of its bars.
         bar: Radius of its bars [m].
         ball: Radius of its spheres [m].
+        calm: Longest time over which its way is smoothed [s]; 0 where nothing shakes it.
         offset: How far it is moved to its place in the picture [m], (3,).
     """
 
@@ -51,6 +52,7 @@ class Actor:
     paint: Paint
     bar: float
     ball: float
+    calm: float
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
@@ -74,7 +76,7 @@ class Actor:
         """Way of its centre of mass, smoothed over a cycle, before it is moved [m], (F, 3)."""
         masses = self.body.masses
         way = np.einsum("m,fmx->fx", masses / masses.sum(), self.frames)
-        return _calm_way(self.times, way, min(self.cycle / 2, _CALM))
+        return _calm_way(self.times, way, min(self.cycle / 2, self.calm))
 
     def way(self, time: float) -> FloatArray:
         """The smoothed way at any time, at its place in the picture [m], (3,)."""
@@ -94,7 +96,7 @@ class Actor:
 def _calm_way(times: FloatArray, way: FloatArray, width: float) -> FloatArray:
     """Return a way, (F, 3) m, smoothed by a bell curve of a width [s]."""
     count, span = len(way), float(times[-1] - times[0])
-    if count < 3:
+    if count < 3 or width == 0.0:
         return way
     sigma = min(width, span / 4) * (count - 1) / span
     reach = min(math.ceil(3 * sigma), count - 1)
@@ -177,7 +179,10 @@ def _actor(
         raise ValueError(f"robot {index}: its positions are not finite, so it cannot be shown")
     bar, ball = appearance.drawn_radii(body.lengths)
     paint = _paint(body, look.color, *(known or (frames, clock)), fixed)
-    return Actor(body, times, clock, frames, paint, bar * look.thickness, ball * look.thickness)
+    touching = result.scene.ground is not None or bool(result.scene.obstacles)
+    calm = _CALM if touching else 0.0
+    thick = look.thickness
+    return Actor(body, times, clock, frames, paint, bar * thick, ball * thick, calm)
 
 
 def _paint(

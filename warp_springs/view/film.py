@@ -26,6 +26,7 @@ _SMALLEST_LETTERS = 9
 _GUTTER = 4
 _GUTTER_COLOR = (250, 251, 252)
 _TILE_MAP = 512
+_TILE_SHAPE = 1.4
 _SAMPLES = 8
 _APART, _BACK, _TRIES = 1.05, 1.02, 40
 _MOST_HIDDEN = 0.08
@@ -244,7 +245,7 @@ def _panel(
     labels: Sequence[str] | None,
 ) -> Iterator[tuple[Shot, slice, slice]]:
     """Tiles of a panel in the order of reading: a shot of one robot each, and its rows, columns."""
-    columns = math.ceil(math.sqrt(len(actors)))
+    columns = _columns(len(actors), rasteriser.size)
     rows = math.ceil(len(actors) / columns)
     width = (rasteriser.size[0] - (columns - 1) * _GUTTER) // columns
     height = (rasteriser.size[1] - (rows - 1) * _GUTTER) // rows
@@ -259,6 +260,17 @@ def _panel(
         words = None if labels is None else [labels[i]]
         shot = Shot([actor], setting, small, labels=words, tile=True)
         yield shot, slice(y, y + height), slice(x, x + width)
+
+
+def _columns(count: int, size: tuple[int, int]) -> int:
+    """How many columns a panel has: tiles of a good shape, few of them empty."""
+
+    def fault(columns: int) -> float:
+        rows = math.ceil(count / columns)
+        shape = size[0] / columns / (size[1] / rows)
+        return abs(math.log(shape / _TILE_SHAPE)) + (rows * columns - count) / count
+
+    return min(range(1, count + 1), key=fault)
 
 
 def _usual_layout(result: Result, count: int) -> str:
