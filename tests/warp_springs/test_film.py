@@ -302,6 +302,21 @@ def test_arrows_show_forces_while_they_act():
         assert abs(shown[frame][0] - shown[frame][2]) < 60
 
 
+def test_broken_springs_are_no_longer_drawn():
+    ends = [(-0.1, 0.0, 0.1), (0.1, 0.0, 0.1)]
+    apart = [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    rod = ws.Robot(masses=1.0, positions=ends, springs=[(0, 1)], stiffness=100.0, velocities=apart)
+    space = ws.Scene(ground=None, gravity=(0, 0, 0))
+    result = ws.Simulation([rod.with_limits(breaks=10.0)], space).run(0.2, fps=100)
+    broke = result.broken(0)[0]  # stretched by 0.1 m: after 0.05 s and a little
+    assert 0.05 < broke < 0.07
+    camera = Camera(eye=(0.0, -1.0, 0.1), target=(0.0, 0.0, 0.1))
+    for frame in (3, 5, 8):
+        pixels = picture(result, size=SIZE, camera=camera, frame=frame)
+        gone = np.ptp(pixels[35:55, 80].astype(int), axis=0).max() < 15  # sky in the middle
+        assert gone == (result.times[frame] > broke)
+
+
 def test_few_cycles_are_said(walk, tmp_path):
     with pytest.warns(UserWarning, match=r"shows 1.6 cycles .* for 3 record 0.75 s"):
         ws.render(walk, tmp_path / "a.webp", size=SIZE, fps=10, duration=0.4)

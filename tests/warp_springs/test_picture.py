@@ -30,6 +30,7 @@ def result_of(robots, poses, ground=True, times=None) -> SimpleNamespace:
         end_time=float(times[-1]),
         recorded=tuple(range(len(robots))),
         frames=lambda i: poses[i],
+        broken=lambda i: np.full(robots[i].n_springs, np.nan),
         positions=lambda i: poses[i][-1],
     )
 

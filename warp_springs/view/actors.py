@@ -41,6 +41,7 @@ class Actor:
         paint: Colours of its bars.
         bar: Radius of its bars [m].
         ball: Radius of its spheres [m].
+        broken: When each of its springs broke [s], (S,); NaN for those that hold.
         calm: Longest time over which its way is smoothed [s]; 0 where nothing shakes it.
         offset: How far it is moved to its place in the picture [m], (3,).
     """
@@ -52,6 +53,7 @@ class Actor:
     paint: Paint
     bar: float
     ball: float
+    broken: FloatArray
     calm: float
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
 
@@ -86,6 +88,10 @@ class Actor:
     def positions(self, time: float) -> FloatArray:
         """Positions at any time, at its place in the picture [m], (M, 3)."""
         return between(self.times, self.frames, time) + self.offset
+
+    def holding(self, time: float) -> NDArray[np.bool_]:
+        """Which of its springs are not broken at a time, (S,)."""
+        return ~(self.broken <= time)
 
     def colors(self, time: float) -> NDArray[np.float32]:
         """Colours of its bars at any time, (S, 3) linear RGB."""
@@ -182,7 +188,8 @@ def _actor(
     touching = result.scene.ground is not None or bool(result.scene.obstacles)
     calm = _CALM if touching else 0.0
     thick = look.thickness
-    return Actor(body, times, clock, frames, paint, bar * thick, ball * thick, calm)
+    broken = result.broken(index)
+    return Actor(body, times, clock, frames, paint, bar * thick, ball * thick, broken, calm)
 
 
 def _paint(

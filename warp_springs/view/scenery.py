@@ -58,7 +58,8 @@ def _add_body(pieces: Pieces, actor: Actor, positions: FloatArray, time: float, 
     if look.skin_color is not None:
         pieces.triangles(first + body.faces, look.skin_color)
     if look.bars:
-        pieces.bars(first + body.springs, actor.bar, actor.colors(time))
+        whole = actor.holding(time)
+        pieces.bars(first + body.springs[whole], actor.bar, actor.colors(time)[whole])
     if look.balls:
         color = np.tile(np.float32(appearance.MASS), (body.n_masses, 1))
         color[body.elements.bonds.masses] = appearance.HELD
