@@ -49,10 +49,12 @@ MOST_JOINTS = 1000
 _FINE = 4000
 """Masses and springs of a file up to which they are finely meshed; beyond, size counts more."""
 _SUFFIXES = (".usdc", ".usda", ".usdz")
-_BLOCK_BYTES = 16_000_000
+_BLOCK_BYTES = 2_000_000
+"""Memory in which frames of a robot are worked out at a time."""
+_SAVE_BYTES = 16_000_000
 """Samples held in memory between two saves."""
 _SCALE_FRAMES = 64
-_SCALE_SPRINGS = 1_000_000
+_SCALE_SPRINGS = 200_000
 """Frames, spread over the animation, that decide what tension takes the full colour and whether a
 robot bends: so many, or fewer where they would have more springs than that in all."""
 
@@ -268,7 +270,7 @@ class _Saver:
     def wrote(self, n_bytes: int, share: float) -> None:
         """Note that samples of so many bytes, such a share of a robot's, were written."""
         self._unsaved += n_bytes
-        if self._unsaved >= _BLOCK_BYTES:
+        if self._unsaved >= _SAVE_BYTES:
             self._stage.Save()
             self._unsaved = 0
         self._finished += share / self._robots

@@ -24,6 +24,8 @@ from warp_springs.robot import Robot
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
+_TURN_BYTES = 300
+"""Memory in which the turn of a mass is computed, for each mass and each spring."""
 _EXTENT_FRAMES = 8
 """Frames between two samples of an extent; each sample holds for all frames around it."""
 
@@ -66,8 +68,14 @@ class Body(ABC):
         self._build()
 
     @property
-    @abstractmethod
     def bytes_a_frame(self) -> int:
+        """Memory that one frame takes while it is written."""
+        work = _TURN_BYTES * (len(self._rest) + self._robot.n_springs) if self._bent else 0
+        return self._sample_bytes + work
+
+    @property
+    @abstractmethod
+    def _sample_bytes(self) -> int:
         """Memory of the samples of one frame."""
 
     @abstractmethod

@@ -82,8 +82,7 @@ class MeshBody(Meshes):
             mesh.GetPrim().RemoveProperty("primvars:normals:indices")
 
     @property
-    def bytes_a_frame(self) -> int:
-        """Memory of the samples of one frame."""
+    def _sample_bytes(self) -> int:
         points = sum(len(part.points) for _, part in self._meshes)
         return _POINT_BYTES * points + 4 * self._detail.sides * self._robot.n_springs + 100
 

@@ -43,8 +43,7 @@ class PointsBody(Body):
         bind(dots, looks.mass)
 
     @property
-    def bytes_a_frame(self) -> int:
-        """Memory of the samples of one frame."""
+    def _sample_bytes(self) -> int:
         return 12 * sum(len(of) for _, of in self._forms) + 4 * self._robot.n_springs + 100
 
     def _write_shape(self, first: int, local: FloatArray) -> None:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-BENT = np.radians(20.0)
-"""Angle between a spring and its place in the stiff body from which on masses turn on their own."""
+BENT = np.radians(45.0)
+"""Angle between a spring and its place in the stiff body from which on masses turn on their own: a
+bar that is not turned is then thinner by 30 %, seen from one side."""
 
 
 def rigid_fit(rest: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -42,9 +43,11 @@ def mass_turns(rest: FloatArray, springs: IntArray, local: FloatArray) -> FloatA
     not turn.
     """
     products = np.einsum("fsi,sj->fsij", _directions(local, springs), _directions(rest, springs))
+    ends = springs.T.ravel()  # a spring and its opposite have the same product
+    order = np.argsort(ends, kind="stable")
+    masses, starts = np.unique(ends[order], return_index=True)
     sums = np.zeros((*local.shape, 3))
-    for end in (0, 1):  # a spring and its opposite have the same product
-        np.add.at(sums, (slice(None), springs[:, end]), products)
+    sums[:, masses] = np.add.reduceat(products[:, order % len(springs)], starts, axis=1)
     return _nearest_turns(sums)
 
 

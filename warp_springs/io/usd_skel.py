@@ -34,8 +34,7 @@ class SkelBody(Meshes):
             binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
 
     @property
-    def bytes_a_frame(self) -> int:
-        """Memory of the samples of one frame."""
+    def _sample_bytes(self) -> int:
         joint = 28 if self._bent else 12
         return joint * len(self._rest) + 4 * self._detail.sides * self._robot.n_springs + 100
 
