@@ -1,7 +1,7 @@
 """Every picture of the README, made again.
 
-    python benchmarks/pictures.py                    # all of them, about ten minutes on two cores
-    python benchmarks/pictures.py scene overview     # some of them, by name
+    python benchmarks/pictures.py                    # all of them: half an hour on two cores
+    python benchmarks/pictures.py scene.png zoo.png  # some of them, by name
 
 They are written to benchmarks/figures. What needs a run of evolution makes one, of the walker
 preset, in a folder that is kept with --run DIR and used again if it is there.
@@ -113,20 +113,23 @@ class Studio:
         figure = self.figures / "stability.png"
         _do(HERE / "stability.py", "--figure", figure, "--resolution", 48, "--soak", 0)
 
+    def peers(self) -> None:
+        """Springs per second of all programs; the first run makes their environments."""
+        figure = self.figures / "peers.png"
+        _do(HERE / "peers/run.py", "--part", "sweep", "--figure", figure)
+
 
 PICTURES: dict[str, Callable[[Studio], None]] = {
-    name: getattr(Studio, name)
-    for name in (
-        "zoo",
-        "zoo_film",
-        "learning_curve",
-        "overview",
-        "scene",
-        "work_precision",
-        "stability",
-    )
+    "zoo.png": Studio.zoo,
+    "zoo.webp": Studio.zoo_film,
+    "learning_curve.png": Studio.learning_curve,
+    "overview.png": Studio.overview,
+    "scene.png": Studio.scene,
+    "work_precision.png": Studio.work_precision,
+    "stability.png": Studio.stability,
+    "peers.png": Studio.peers,
 }
-"""What can be made, by name."""
+"""What can be made, by the name of its file."""
 
 
 def _with(result: ws.Result, obstacles: tuple, robot: ws.Robot) -> ws.Result:
