@@ -111,7 +111,6 @@ class Crowd:
         self._kernels: dict[bool, object] = {}
         self._cores = cores
         self._make()
-        self.prepare(ledger=False)
 
     # What a layout does in its own way.
 

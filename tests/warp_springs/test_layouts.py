@@ -9,6 +9,7 @@ import pytest
 import warp_springs as ws
 from warp_springs import crowd
 
+KINDS = ("Threads", "Launches", "Blocks")
 DT = 5e-4
 DURATION = 0.1
 # Every branch of the law is in one of these; what none of them has is left out of their kernels.
@@ -28,7 +29,11 @@ CASES = {
         ws.Scene(ground=ws.Ground(friction="course"), damping=0.2),
         True,
     ),
-    "passive": ({"integrator": "leapfrog", "precision": "float32"}, ws.Scene(drag=0.02), False),
+    "passive": (
+        {"integrator": "leapfrog", "precision": "float32"},
+        ws.Scene(ground=ws.Ground(static_friction=0.3, kinetic_friction=0.2), drag=0.02),
+        False,
+    ),
     "far": (
         {"integrator": "chin4", "precision": "mixed"},
         ws.Scene(ground=ws.Ground(static_friction=0.6, kinetic_friction=0.4), damping=0.1),
@@ -46,16 +51,6 @@ CASES = {
             water=ws.Water(level=0.03, density=0.5, drag=0.2),
             drag=0.01,
         ),
-        True,
-    ),
-    "held": (
-        {"integrator": "leapfrog", "precision": "float32"},
-        ws.Scene(ground=ws.Ground(static_friction=0.3, kinetic_friction=0.2)),
-        False,
-    ),
-    "free": (
-        {"integrator": "chin4", "precision": "float32"},
-        ws.Scene(ground=None, gravity=(0, 0, 0)),
         True,
     ),
 }
@@ -107,7 +102,7 @@ def population(case):
     robots = bodies(CASES[case][2])
     if case == "far":
         return [robot.moved((1000, -500, 0)).moving((20, -10, 0)) for robot in robots]
-    if case in ("elements", "held"):
+    if case in ("elements", "passive"):
         return [with_elements(robot) for robot in robots]
     return robots
 
@@ -143,7 +138,7 @@ def agree(result, expected, tolerance):
         assert np.abs(mine - theirs).max() < 1e2 * tolerance * (1.0 + np.abs(theirs).max())
 
 
-@pytest.mark.parametrize("kind", ["Threads", "Launches", "Blocks"])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("case", CASES)
 def test_every_layout_moves_robots_as_the_lanes_do(case, kind, launches_too):
     options, scene, _ = CASES[case]
@@ -171,7 +166,7 @@ def fingerprint(result, robot):
     return tuple(np.asarray(part).tobytes() for part in parts)
 
 
-@pytest.mark.parametrize("kind", ["Threads", "Launches", "Blocks"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_bits_depend_on_the_robot_alone(kind, launches_too):
     options, scene, actuated = CASES["everything"]
     launches_too["flat"] = getattr(crowd, kind)
@@ -202,7 +197,7 @@ def test_bits_do_not_depend_on_the_threads():
     agree(two, lanes, TOLERANCE["float64"])
 
 
-@pytest.mark.parametrize("kind", ["Threads", "Launches", "Blocks"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_splitting_and_looking_change_no_bit(kind, launches_too):
     options, scene, actuated = CASES["everything"]
     launches_too["flat"] = getattr(crowd, kind)
@@ -218,7 +213,7 @@ def test_splitting_and_looking_change_no_bit(kind, launches_too):
         assert parts.velocities(i).tobytes() == plain.velocities(i).tobytes()
 
 
-@pytest.mark.parametrize("kind", ["Threads", "Launches", "Blocks"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_robot_that_goes_wrong_is_stopped_and_harms_nobody(kind, launches_too):
     launches_too["flat"] = getattr(crowd, kind)
     layout = "block" if kind == "Blocks" else "flat"
@@ -276,6 +271,8 @@ def test_what_cannot_run_is_refused_in_one_line():
         ws.Simulation(cube, device="toaster")
     with pytest.raises(ValueError, match=r"layout: got 'rows', expected 'auto' or 'lanes'"):
         ws.Simulation(cube, layout="rows")
+    with pytest.raises(NotImplementedError, match=r"Elements.* 'lanes'"):
+        ws.Simulation(cube.with_cables(), layout="flat")
     big = ws.shapes.lattice(10, 10, 10)
     with pytest.raises(
         ValueError, match=r"robots\[1\] has 1331 masses, 'block' expects 384 or fewer"
