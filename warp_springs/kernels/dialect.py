@@ -80,7 +80,7 @@ def vector_dialect(precision: str, width: int) -> str:
     auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
     auto lane_of = [](const real& a, int l) -> scalar {{ return a[l]; }};
     auto set_lane = [](real& a, int l, scalar value) {{ a[l] = value; }};
-    auto over_root = [](real h, real a) __attribute__((always_inline)) -> real {{
+    auto less_over_root = [](real k, real h, real a) __attribute__((always_inline)) -> real {{
     #if defined(__AVX512F__) && defined(__AVX512VL__)
         typedef scalar part __attribute__((vector_size(16)));
         typedef scalar whole __attribute__((vector_size({size * whole})));
@@ -98,9 +98,9 @@ def vector_dialect(precision: str, width: int) -> str:
             }}
         }}
         const real e = scalar(1) - (a * y) * y;
-        return {_SERIES[name]};
+        return k - {_SERIES[name]};
     #else
-        return (h + h) / __builtin_elementwise_sqrt(a);
+        return k - (h + h) / __builtin_elementwise_sqrt(a);
     #endif
     }};
     """
@@ -125,12 +125,12 @@ def scalar_dialect(precision: str) -> str:
     auto square_root = [](real a) -> real {{ return {_ROOT[name]}; }};
     auto lane_of = [](real a, int) -> scalar {{ return a; }};
     auto set_lane = [](real& a, int, scalar value) {{ a = value; }};
-    auto over_root = [](real h, real a) -> real {{
+    auto less_over_root = [](real k, real h, real a) -> real {{
     #if defined(__CUDA_ARCH__)
         {_DEVICE_ROOT[name]}
-        return (h + h) * y;
+        return k - (h + h) * y;
     #else
-        return (h + h) / {_ROOT[name]};
+        return k - (h + h) / {_ROOT[name]};
     #endif
     }};
     """

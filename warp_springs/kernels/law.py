@@ -9,7 +9,8 @@ A layout puts in front of ``LAW`` a dialect that defines
 ``select(m, a, b)``       ``m ? a : b``, lane by lane
 ``any(m)``                true if any lane of ``m`` is
 ``square_root(a)``        IEEE square root
-``over_root(h, a)``       2 h / sqrt(a) to the last bit or two, for a >= TINY
+``less_over_root(k, h,    k - 2 h / sqrt(a), the root to the last bit or two, for a >= TINY
+a)``
 ``MIXED``                 a macro, 0 or 1: whether positions and velocities are sums of two numbers,
                           the positions about ``origin[3]``, pointed to, of type ``real``
 ========================  ======================================================================
@@ -176,7 +177,7 @@ auto squared_length = [=](real x, real y, real z) __attribute__((always_inline))
     return x * x + (y * y + (z * z + TINY));
 };
 auto spring_pull = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
-    return k - over_root(h, length2);
+    return less_over_root(k, h, length2);
 };
 // The same for a spring of stiffness k and rest length L0 to a point, d away.
 auto tether_force = [=](Vec d, real k, real L0) __attribute__((always_inline)) -> Vec {
@@ -213,13 +214,14 @@ auto breathing_rate = [=](real hs, real hc, real sine, real cosine, real omega)
 """
     + SPRINGS
     + r"""
-// Exact flow of dv/dt = -c |v| v / m over h: |v| falls to |v| / (1 + c |v| h / m). A speed whose
-// square overflows must not come out as rest: it turns into NaN, which the health check sees.
-auto drag_flow = [=](Vec& v, real w, real ch) __attribute__((always_inline)) {
-    real speed2 = v.x * v.x + v.y * v.y + v.z * v.z;
-    real slowing = square_root(speed2) * w * ch + scalar(1);
-    real factor = (zero + scalar(1)) / slowing + speed2 * scalar(0);
-    v.x *= factor; v.y *= factor; v.z *= factor;
+// Exact flow of du/dt = -c |u| u / m over h, of the velocity u = `against` to what v moves in: |u|
+// falls to |u| / (1 + c |u| h / m). A speed whose square overflows must not come out as rest: it
+// turns into NaN, which the health check sees.
+auto drag_flow = [=](Sum& v, Vec against, real w, real ch) __attribute__((always_inline)) {
+    real speed2 = against.x * against.x + against.y * against.y + against.z * against.z;
+    real slowing = square_root(speed2) * w * ch;
+    real part = slowing / (slowing + scalar(1)) + speed2 * scalar(0);
+    add(v, scaled(against, part), scalar(-1));
 };
 
 // Force of an elastic surface of stiffness k on a mass at height z over it.
@@ -318,23 +320,21 @@ auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inlin
     if (LEDGER) losses.damping = losses.damping + (before - v);
 };
 // Drag against the air, which the wind moves, and against the water, which is still.
-auto slow_in_air = [=](Vec& v, real w, scalar time) __attribute__((always_inline)) {
+auto slow_in_air = [=](Sum& v, real w, scalar time) __attribute__((always_inline)) {
     const Vec wind = {zero + wind_x, zero + wind_y, zero + wind_z};
-    if (WIND) v = v - wind;
-    if (DRAG) drag_flow(v, w, zero + drag * time);
-    if (WIND) v = v + wind;
+    if (DRAG) drag_flow(v, WIND ? v - wind : Vec(v), w, zero + drag * time);
 };
-auto slow_in_water = [=](Vec& v, real z, real w, scalar time) __attribute__((always_inline)) {
-    if (WATER) drag_flow(v, w, immersed(z) * (water_drag * time));
+auto slow_in_water = [=](Sum& v, real z, real w, scalar time) __attribute__((always_inline)) {
+    if (WATER) drag_flow(v, v, w, immersed(z) * (water_drag * time));
 };
-auto slow_down = [=](Vec& v, Vec x, real w, scalar time, bool water_first, const Own& own,
+auto slow_down = [=](Sum& v, Vec x, real w, scalar time, bool water_first, const Own& own,
                      Losses& losses) __attribute__((always_inline)) {
     if (!DRAG && !WATER) return;
     const Vec before = v;
     if (water_first) slow_in_water(v, x.z, w, time);
     slow_in_air(v, w, time);
     if (!water_first) slow_in_water(v, x.z, w, time);
-    if (BOUND && WIND) v = tangent(v, x, own);
+    if (BOUND && WIND) restrain(v, tangent(v, x, own));
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
 auto rub = [=](Sum& v, real hold, real impulse, const Own& own, Losses& losses, scalar kinetic)
