@@ -9,11 +9,12 @@ decided by the robot alone, never by its neighbours, so its bits do not depend o
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warp_springs.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
 from warp_springs.element_packing import (
     PACKED_ELEMENTS,
     SHARED_ELEMENTS,
@@ -69,6 +70,7 @@ PACKED = (
     "states",
     *PACKED_ELEMENTS,
     *SHARED_ELEMENTS,
+    *PACKED_COLLISIONS,
 )
 
 
@@ -143,6 +145,7 @@ class Batch:
         scene: Their world.
         method: How they are stepped.
         layout_of: The layout of a robot with so many masses.
+        bodies: For robots that are worlds of several: the body of each mass, shape (M,).
 
     Attributes:
         slots: Where each robot lives.
@@ -162,8 +165,10 @@ class Batch:
         scene: Scene,
         method: Method,
         layout_of: Callable[[int], str] = lambda masses: "lanes",
+        bodies: Mapping[int, np.ndarray] | None = None,
     ) -> None:
         refuse_unsupported(robots, scene, method.precision)
+        self._robots, self._bodies = robots, bodies or {}
         self._scene, self._method, self._layout_of = scene, method, layout_of
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
@@ -195,6 +200,12 @@ class Batch:
         """The robots by kind, and by topology."""
         width = native_width(self._method.precision)
         strips: dict[Kind, list[Strip]] = defaultdict(list)
+        if self._scene.collisions is not None:
+            for index, robot in enumerate(robots):
+                strip = Strip.alike([index], [robot])
+                traits = replace(traits_of(robot.elements), colliding=True)
+                strips[1, bool(breathes(strip)[0]), "lanes", traits].append(strip)
+            return strips
         alone: dict[bool, list[int]] = defaultdict(list)
         gathered: list[Strip] = []
         by_hand: list[int] = []
@@ -326,6 +337,11 @@ class Batch:
                 invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
         self._pack_elements(strip, width, elements, order, row)
+        if self._scene.collisions is not None:
+            robot = self._robots[int(strip.ids[0])]
+            bodies = self._bodies.get(int(strip.ids[0]), np.zeros(robot.n_masses, np.int32))
+            for name, values in collision_buffers(robot, bodies, self._scene.collisions).items():
+                self._append(name, values.astype(dtype_of(name, method.precision)))
         # A stiffness that vanishes would be divided by.
         vanished = fields["stiffness"].astype(real) == 0.0
         invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
@@ -392,14 +408,19 @@ class Batch:
         sizes = {name: values.size // len(strip.ids) for name, values in elements.items()}
         for name, column in PACKED_ELEMENTS.items():
             blocks[column] = (name, np.full(len(masses), sizes.get(name, 0) * width))
-        for name, column in SHARED_ELEMENTS.items():
+        for name, column in (SHARED_ELEMENTS | PACKED_COLLISIONS).items():
             blocks[column] = (name, 0 * masses)
         table = {
             column: self._sizes[buffer] + np.cumsum(sizes) - sizes
             for column, (buffer, sizes) in blocks.items()
         }
         table |= {"masses": masses, "springs": counts}
-        for column, count in element_counts(strip.elements).items():
+        counts = element_counts(strip.elements)
+        if self._scene.collisions is not None:
+            counts |= collision_counts(self._robots[int(strip.ids[0])])
+        else:
+            counts |= dict.fromkeys(("triangles", "edges", "capacity"), 0)
+        for column, count in counts.items():
             table[column] = np.full(len(masses), count)
         leaders = strip.ids[::width]
         table["substeps"] = self.substeps[leaders]

@@ -126,7 +126,7 @@ class Collisions:
     """
 
     thickness: float = 0.0
-    stiffness: float = 1e4
+    stiffness: float = 1e5
     static_friction: float = 1.0
     kinetic_friction: float = 0.8
     damping: float = 0.1

@@ -26,6 +26,7 @@ from warp_springs.slices import Tape, cut, run_all
 from warp_springs.stability import Limits, Status
 from warp_springs.support import needs_lanes
 from warp_springs.variants import Variants
+from warp_springs.worlds import Member, gathered, on_a_grid
 
 __all__ = ["Simulation"]
 
@@ -49,6 +50,11 @@ class Simulation:
             from the ground's stiffness, its lightest mass and the step.
         threads: CPU threads, by default as many as this process may use.
         limits: What stops a robot; ``Limits()`` by default.
+        world: ``"apart"``: each robot in a world of its own. ``"grid"``: likewise, but side by
+            side, for a joint picture. ``"together"``: all in one world, or the number of its
+            world for each robot: the robots of one world become one robot, with one status and
+            one ledger, and meet if the scene has collisions; ``members`` says which masses are
+            whose.
         layout: How the robots lie in memory and which thread does what; the physics is the same,
             results agree to rounding. ``"auto"`` chooses for each robot: on a CPU ``"lanes"``
             (many robots at once, one in each SIMD lane), for a large body ``"flat"`` (its masses
@@ -76,9 +82,12 @@ class Simulation:
         contact_substeps: int | None = None,
         threads: int | None = None,
         limits: Limits | None = None,
+        world: Literal["apart", "grid", "together"] | Sequence[int] = "apart",
         layout: Literal["auto", "lanes", "block", "flat"] = "auto",
     ) -> None:
         self.robots = _check_robots(robots)
+        self.members: tuple[tuple[Member, ...], ...] | None = None
+        bodies = self._gather(world)
         self.scene = _check_type("scene", Scene() if scene is None else scene, Scene)
         self.limits = _check_type("limits", Limits() if limits is None else limits, Limits)
         auto = isinstance(dt, str)
@@ -96,7 +105,7 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
-        needs = needs_lanes(self.robots)
+        needs = needs_lanes(self.robots, self.scene)
         if needs and (layout not in ("auto", "lanes") or not place.is_cpu):
             raise NotImplementedError(f"{needs}: for the layout 'lanes' on a CPU so far")
         layout = "lanes" if needs else layout
@@ -109,9 +118,24 @@ class Simulation:
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
         layout_of = functools.partial(choose, layout, place, precision)
-        self._batch = Batch(self.robots, self.scene, self._method, layout_of)
+        self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)
+
+    def _gather(self, world: str | Sequence[int]) -> dict[int, np.ndarray]:
+        """Put the robots into their worlds; the body of each mass of a world of several."""
+        if isinstance(world, str):
+            check_choice("world", world, ("apart", "grid", "together"))
+            if world == "apart":
+                return {}
+            if world == "grid":
+                self.robots = tuple(on_a_grid(self.robots))
+                return {}
+            world = [0] * len(self.robots)
+        worlds, members = gathered(self.robots, world)
+        self.robots, self.members = tuple(worlds), tuple(map(tuple, members))
+        sizes = [[part.stop - part.start for _, part in inside] for inside in members]
+        return {i: np.repeat(np.arange(len(n)), n) for i, n in enumerate(sizes)}
 
     @property
     def time(self) -> float:

@@ -31,6 +31,10 @@ Integrator = Literal["chin4", "leapfrog", "euler"]
 _LARGEST_GROUND_PHASE = {"chin4": 3.14, "leapfrog": 3.14, "euler": 1.0}
 
 
+#: Springs of collisions that a mass may have at once: a corner that stands on a face has as many.
+TOUCHES = 4
+
+
 class Status(enum.IntEnum):
     """Why a robot was stopped; ``OK`` is zero, so that any other value is true."""
 
@@ -114,6 +118,10 @@ def stable_dt(
 def stable_step(strip: Strip, scene: Scene, integrator: str) -> np.ndarray:
     """``stable_dt`` for the robots of a strip, shape (n,)."""
     springs = _largest_frequency(strip)
+    if scene.collisions is not None:
+        lightest = largest(1.0 / strip.fields["masses"], strip.masses)
+        contact = 2 * TOUCHES * scene.collisions.stiffness * lightest
+        springs = np.hypot(springs, np.sqrt(contact))
     if scene.water is not None:
         springs = np.hypot(springs, np.sqrt(scene.water.stiffness(scene.gravity)))
     if not scene.stiffest_surface:

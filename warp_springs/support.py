@@ -31,8 +31,10 @@ def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     return [robot.elements for robot in some if robot.elements is not NONE]
 
 
-def needs_lanes(robots: Sequence[Robot]) -> str:
+def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
     """What only the layout "lanes" can do here, in words; empty if nothing."""
+    if scene.collisions is not None:
+        return "Scene.collisions"
     for elements in elements_of(robots):
         for name in SPRING_ELEMENTS:
             if getattr(elements, name) is not None:
@@ -42,13 +44,11 @@ def needs_lanes(robots: Sequence[Robot]) -> str:
 
 def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:
     """Raise NotImplementedError for what the kernels cannot simulate."""
-    if scene.collisions is not None:
-        raise NotImplementedError("Scene.collisions cannot be simulated yet")
-    placed = bool(scene.obstacles)
+    placed = bool(scene.obstacles) or scene.collisions is not None
     for elements in elements_of(robots):
         placed |= len(elements.bonds) > 0 or len(elements.tethers) > 0
     if placed and precision == "mixed":
         raise NotImplementedError(
             "precision: 'mixed' counts positions from a moving origin, and knows no obstacles, "
-            "constraints or tethers; use 'float64' or 'float32'"
+            "collisions, constraints or tethers; use 'float64' or 'float32'"
         )

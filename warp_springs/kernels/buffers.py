@@ -58,6 +58,17 @@ BUNDLE = (
     "schedule",  # [S][T][2][W]
     "worn",  # [S][2][W]
     "broken",  # [S][W]
+    "triangle",  # collisions: T triangles [3]
+    "edge",  # E edges [2]
+    "body",  # the body of each mass, M of them
+    "near_row",  # where the neighbours of each mass begin, M + 1
+    "near",  # the masses that springs join to each
+    "pair_list",  # see kernels.collisions
+    "listed",  # [3 M]
+    "contact",  # see warp_springs.colliding
+    "triangles",  # T
+    "edges",  # E
+    "capacity",  # pairs
 )
 
 #: Accounts of the ledger [J]: what a robot was given and lost since it was opened.
@@ -93,6 +104,12 @@ MODEL = {
     "spring_starts": np.int32,
     "spring_omegas": np.float64,  # rad/s, where springs have their own
     "times": np.float64,  # s
+    "triangles": np.int32,  # for collisions: corners
+    "edges": np.int32,  # ends
+    "bodies": np.int32,
+    "near_rows": np.int32,
+    "nears": np.int32,
+    "contacts": REAL,  # warp_springs.colliding.CONTACT
     "schedules": REAL,  # factor of the stiffness, and h = k / 2 times what is added to L0
     "reaches2": REAL,  # square of the length that stops a robot, m^2
     "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision
@@ -115,6 +132,8 @@ STATE = {
     "spring_oscillators": REAL,  # likewise, four a spring and lane
     "worn": REAL,  # how far a spring has flowed, m, and 1, or 0 where it is broken
     "broken_at": np.float64,  # s
+    "pair_lists": np.int32,  # pairs that may collide: how many, the sorted features, the pairs
+    "listed_positions": REAL,  # where the masses were when they were looked up
     "states": np.int32,  # Status
     "state_times": np.float64,  # when it was found, s
     "ledgers": REAL,  # the accounts, and their good copies

@@ -7,6 +7,7 @@ passes that step them.
 from dataclasses import astuple, dataclass, replace
 
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES
+from warp_springs.kernels.collisions import COLLIDING
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.element_text import OWN_OF, RATES
 from warp_springs.kernels.law import CONSTANTS, LAW
@@ -87,7 +88,18 @@ def preamble(features: Features) -> str:
     lines += ["const double* const obstacles = model.obstacles.data;"]
     lines += ["const double* const heights = model.heights.data;"]
     dialect = vector_dialect(features.precision, features.width) + feature_flags(features)
-    return dialect + "\n".join(lines) + _ORIGIN + LAW + _BUNDLE
+    collisions = COLLIDING if features.traits.colliding else _APART
+    bundle = _BUNDLE.replace(_COLLISIONS, collisions)
+    return dialect + "\n".join(lines) + _ORIGIN + LAW + bundle
+
+
+# Where collisions have their place in the text, and what stands there without them.
+_COLLISIONS = "// collisions\n"
+_APART = """
+real collision_energy = zero;
+auto collide = [](const Vec*, scalar, bool, bool) {};
+auto enter_collisions = [](scalar) {};
+"""
 
 
 # The origin of the positions of each lane, as the law sees it.
@@ -383,6 +395,11 @@ kick_end = now;
 kick_begin = now - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
 if (OUTER) gather_outer(x);
 consult_timetable(now);
+if (COLLIDING) {
+    collide(x, FIRST_KICK, step > 0, false);
+    if (step > 0 && !EULER) enter_collisions(FIRST_KICK);
+    ground += collision_energy;
+}
 if (DASHPOTS && step > 0) {
     auto rows = [&](const Vec* at, auto move) {
         for (int i = 0; i < M; ++i) move(i, row_force(at, i, sine, cosine));

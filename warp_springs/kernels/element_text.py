@@ -49,6 +49,7 @@ auto own_of = [=](int i) __attribute__((always_inline)) -> Own {
 # The dashpots act within the kicks, by the midpoint rule: their forces are those at velocities that
 # half of the kick has changed already.
 RATES = r"""
+// collisions
 Vec* const before_v = (Vec*)(outer + (OUTER ? M : 0));
 Vec* const middle_v = before_v + M;
 auto find_rates = [&](const Vec* where, scalar time, bool start, auto sweep) {
@@ -61,6 +62,7 @@ auto find_rates = [&](const Vec* where, scalar time, bool start, auto sweep) {
     }
     rate_v = before_v;
     if (!EULER) {
+        if (COLLIDING) collide(where, time, true, false);
         sweep(where, [&](int i, Vec f) {
             const Vec at = in_world(sum_of(x, low_x, i));
             const Vec a = kick_acceleration(f, at, w[i], own_of(i));

@@ -113,6 +113,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
     const Vec* const where = shifted ? shifted_x : x;
     if (OUTER) gather_outer(where);
     if (DASHPOTS) find_rates(where, time, start, sweep);
+    if (COLLIDING) { collide(where, time, true, true); enter_collisions(time); }
     sweep(where, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         real rest = CHIN4 && GROUND && last ? left_over[i] : zero;
@@ -127,6 +128,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
 auto gradient_shift = [&]() __attribute__((always_inline)) {
     if (OUTER) gather_outer(x);
     if (DASHPOTS) rate_v = nullptr;
+    if (COLLIDING) collide(x, GRADIENT_KICK, false, true);
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         shifted_x[i] = shifted_position(sum_of(x, low_x, i), f, w[i], own_of(i));
     });
@@ -134,6 +136,7 @@ auto gradient_shift = [&]() __attribute__((always_inline)) {
 auto euler = [&]() __attribute__((always_inline)) {
     if (OUTER) gather_outer(x);
     if (DASHPOTS) find_rates(x, dt, true, sweep);
+    if (COLLIDING) { collide(x, dt, true, true); enter_collisions(dt); }
     sweep(x, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         move_mass_euler(a, u, f, w[i], ledger, own_of(i));

@@ -22,6 +22,7 @@ class Traits:
         dashpots: Damping of springs.
         limits: Breaking or yielding.
         timetable: Stiffness and rest length in time.
+        colliding: Collisions; bundles are then of one robot, or of one world.
     """
 
     outer: bool = False
@@ -34,6 +35,7 @@ class Traits:
     dashpots: bool = False
     limits: bool = False
     timetable: bool = False
+    colliding: bool = False
 
     @property
     def name(self) -> str:

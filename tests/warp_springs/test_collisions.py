@@ -1,0 +1,177 @@
+"""Collisions and worlds: bounces and friction in closed form, a pile, who meets whom."""
+
+import numpy as np
+import pytest
+
+import warp_springs as ws
+
+WEIGHTLESS = {"gravity": (0, 0, 0), "ground": None}
+SMOOTH = {"static_friction": 0.0, "kinetic_friction": 0.0, "damping": 0.0}
+
+
+def point(position, velocity, mass=0.1):
+    return ws.Robot(
+        masses=[mass],
+        positions=[position],
+        velocities=[velocity],
+        springs=np.empty((0, 2), int),
+        stiffness=[],
+    )
+
+
+def plate(size=1.0):
+    """A fixed triangle in the plane z = 0 around the origin."""
+    angles = np.array([0, 2, 4]) * np.pi / 3
+    corners = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * size
+    return ws.Robot(
+        masses=1.0,
+        positions=corners,
+        springs=[(0, 1), (1, 2), (0, 2)],
+        stiffness=1e3,
+        faces=[(0, 1, 2)],
+    ).fixed()
+
+
+def together(robots, duration, dt=1e-4, fps=50, collisions=None, **scene):
+    scene = ws.Scene(collisions=collisions or ws.Collisions(thickness=0.01), **scene)
+    simulation = ws.Simulation(robots, scene, dt=dt, world="together")
+    return simulation, simulation.run(duration, fps=fps, energy=True)
+
+
+def test_a_mass_bounces_off_a_triangle_as_off_a_spring():
+    k = 1e4
+    collisions = ws.Collisions(thickness=0.01, stiffness=k, **SMOOTH)
+    mass = point((0.1, 0.05, 0.11), (0.3, 0.0, -1.0))
+    _, result = together([mass, plate()], 0.3, collisions=collisions, **WEIGHTLESS)
+    contact = np.pi * np.sqrt(0.1 / k)  # half a period, the plate is fixed
+    there = 0.01 + 1.0 * (0.3 - 0.1 - contact)
+    assert result.positions(0)[0] == pytest.approx((0.1 + 0.3 * 0.3, 0.05, there), abs=1e-4)
+    assert result.velocities(0)[0] == pytest.approx((0.3, 0.0, 1.0), abs=1e-5)
+    assert np.abs(result.energy.residual).max() < 1e-5
+    assert result.energy.ground.max() >= 0.0
+
+
+@pytest.mark.parametrize("integrator", ["chin4", "leapfrog", "euler"])
+def test_crossed_rods_of_equal_mass_exchange_their_velocities(integrator):
+    rods = {"masses": [0.1, 0.1], "springs": [(0, 1)], "stiffness": [1e4]}
+    one = ws.Robot(positions=[(-0.1, 0, 0), (0.1, 0, 0)], **rods).moving((0, 0, -1.0))
+    two = ws.Robot(positions=[(0, -0.1, -0.1), (0, 0.1, -0.1)], **rods)
+    scene = ws.Scene(collisions=ws.Collisions(thickness=0.01, **SMOOTH), **WEIGHTLESS)
+    simulation = ws.Simulation([one, two], scene, dt=5e-5, integrator=integrator, world="together")
+    result = simulation.run(0.2, fps=50, energy=True)
+    up, down = result.velocities(0)[:2].mean(axis=0), result.velocities(0)[2:].mean(axis=0)
+    assert up == pytest.approx((0, 0, 0), abs=2e-3)
+    assert down == pytest.approx((0, 0, -1), abs=2e-3)
+
+
+def test_a_mass_slides_on_a_face_as_far_as_its_friction_lets_it():
+    mu, v = 0.5, 1.0
+    collisions = ws.Collisions(thickness=0.01, static_friction=mu, kinetic_friction=mu, damping=0.3)
+    sunk = 0.1 * 9.81 / collisions.stiffness
+    mass = point((-0.2, 0.0, 0.01 - sunk), (v, 0.0, 0.0))
+    _, result = together([mass, plate()], 0.5, collisions=collisions, ground=None)
+    assert result.positions(0)[0, 0] + 0.2 == pytest.approx(v**2 / (2 * mu * 9.81), rel=0.01)
+    assert np.abs(result.velocities(0)[0]).max() < 1e-3
+    assert result.energy.friction_loss[0, -1] == pytest.approx(0.05 * v**2, rel=0.01)
+
+
+def test_momentum_and_energy_survive_a_crash_of_two_spinning_cubes(cube):
+    stiff = cube.replace(stiffness=1e4).moved(-cube.center_of_mass)
+    one = stiff.rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moving((1.0, 0, 0))
+    two = stiff.rotated((3, 1, 2), 0.4).spinning((-1, 5, 2)).moved((0.3, 0.03, 0.02))
+    smooth = ws.Collisions(**SMOOTH)
+    simulation, result = together([one, two], 0.5, collisions=smooth, **WEIGHTLESS)
+    world = result.robots[0]
+    v, x = result.velocities(0), result.positions(0)
+    assert world.masses @ v == pytest.approx((0.8, 0, 0), abs=1e-10)
+    spin = [
+        (world.masses[:, None] * np.cross(*state)).sum(axis=0)
+        for state in ((x, v), (world.positions, world.velocities))
+    ]
+    assert spin[0] == pytest.approx(spin[1], abs=1e-9)
+    second = simulation.members[0][1][1]
+    assert world.masses[second] @ v[second, 0] > 0.3  # it was pushed
+    assert np.abs(result.energy.residual).max() < 5e-3 * result.energy.total[0, 0]
+
+
+def depth(world, members, x):
+    """How deep any mass of one cube is inside another: they are convex."""
+    worst = 0.0
+    for i, (_, own) in enumerate(members):
+        for j in range(len(members)):
+            corners = x[world.faces[12 * j : 12 * j + 12]]
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normal /= np.linalg.norm(normal, axis=1)[:, None]
+            above = np.einsum("tk,ptk->pt", normal, x[own][:, None] - corners[:, 0]).max(axis=1)
+            worst = max(worst, -above.min()) if i != j else worst
+    return worst
+
+
+def test_ten_cubes_come_to_rest_in_a_pile():
+    rng = np.random.default_rng(1)
+    cubes = []
+    for i in range(10):
+        cube = ws.shapes.cube(edge=0.1, mass=0.8, stiffness=1e4)
+        turned = cube.moved(-cube.center_of_mass).rotated(rng.normal(size=3), rng.uniform(0, 6))
+        cubes.append(turned.moved((*rng.normal(0, 0.02, 2), 0.15 + 0.2 * i)))
+    normals = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
+    walls = tuple(ws.Plane(n, -0.16, static_friction=0.3, kinetic_friction=0.3) for n in normals)
+    scene = ws.Scene(damping=0.5, obstacles=walls, collisions=ws.Collisions())
+    simulation = ws.Simulation(cubes, scene, world="together")
+    result = simulation.run(4.0, fps=25, energy=True)
+    energy, frames = result.energy, result.frames(0)
+    assert result.status[0] == ws.Status.OK
+    assert max(depth(result.robots[0], simulation.members[0], x) for x in frames) < 0.005
+    assert np.diff(energy.total[0]).max() < 1e-3 * energy.total[0, 0]  # nothing from nowhere
+    assert energy.kinetic[0, -1] < 1e-4 * energy.total[0, 0]
+    assert frames[-1, :, 2].max() > 0.2  # some lie on others
+    assert np.abs(frames[-1] - frames[-6]).max() < 0.01
+
+
+def test_a_body_meets_itself_only_if_asked(cube):
+    upper = cube.moved((0.02, 0.03, 0.3)).moving((0, 0, -1.0))
+    body = cube.joined(upper)  # no spring between the two parts
+    for within, stops in ((True, True), (False, False)):
+        scene = ws.Scene(collisions=ws.Collisions(within=within), **WEIGHTLESS)
+        result = ws.Simulation(body, scene, dt=2e-4).run(0.3)
+        below = result.positions(0)[8:, 2].min() < 0.05
+        assert below != stops
+
+
+def test_robots_of_separate_worlds_never_meet(cube):
+    low, high = cube, cube.moved((0, 0, 0.15)).moving((0, 0, -1.0))
+    scene = ws.Scene(collisions=ws.Collisions(), **WEIGHTLESS)
+    apart = ws.Simulation([low, high], scene, dt=5e-4).run(0.2)
+    assert apart.positions(0) == pytest.approx(low.positions, abs=1e-12)
+    pairs = ws.Simulation([low, low, high, high], scene, dt=5e-4, world=[0, 1, 0, 0])
+    assert [[robot for robot, _ in inside] for inside in pairs.members] == [[0, 2, 3], [1]]
+    result = pairs.run(0.2)
+    assert len(result) == 2
+    assert result.positions(1) == pytest.approx(low.positions, abs=1e-12)
+    assert np.abs(result.positions(0)[pairs.members[0][0][1]] - low.positions).max() > 0.01
+
+
+def test_a_grid_puts_robots_side_by_side_and_changes_nothing_else(cube, walker):
+    alone = ws.Simulation([cube, walker, cube], ws.Scene(), dt=5e-4).run(0.1)
+    grid = ws.Simulation([cube, walker, cube], ws.Scene(), dt=5e-4, world="grid").run(0.1)
+    for i in range(3):
+        shift = grid.robots[i].positions[0] - alone.robots[i].positions[0]
+        assert grid.positions(i) - shift == pytest.approx(alone.positions(i), abs=1e-9)
+    distances = np.linalg.norm(np.diff(grid.center_of_mass[:, :2], axis=0), axis=1)
+    assert distances.min() > walker.diameter
+
+
+def test_robots_with_omegas_of_their_own_share_a_world(cube):
+    robots = [cube.breathing(0.1, 5.0), cube.moved((0.5, 0, 0)).breathing(0.1, 9.0)]
+    scene = ws.Scene(**WEIGHTLESS)
+    world = ws.Simulation(robots, scene, dt=5e-4, world="together").run(0.2)
+    apart = ws.Simulation(robots, scene, dt=5e-4).run(0.2)
+    assert world.positions(0)[8:] == pytest.approx(apart.positions(1), abs=1e-11)
+
+
+def test_looking_changes_nothing(cube):
+    robots = [cube, cube.rotated((1, 2, 3), 0.5).moved((0.02, 0, 0.2))]
+    scene = ws.Scene(collisions=ws.Collisions())
+    seen = ws.Simulation(robots, scene, dt=5e-4, world="together").run(0.3, fps=100)
+    unseen = ws.Simulation(robots, scene, dt=5e-4, world="together").run(0.3)
+    assert np.array_equal(seen.positions(0), unseen.positions(0))

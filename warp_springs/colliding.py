@@ -1,0 +1,84 @@
+"""What of a body can collide: its triangles, their edges, and who belongs together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warp_springs.robot import Robot
+from warp_springs.scene import Collisions
+
+__all__ = ["CONTACT", "PACKED_COLLISIONS", "collision_buffers", "collision_counts"]
+
+#: Buffers of collisions, and the columns of the table of bundles that say where.
+PACKED_COLLISIONS = {
+    "triangles": "triangle",
+    "edges": "edge",
+    "bodies": "body",
+    "near_rows": "near_row",
+    "nears": "near",
+    "pair_lists": "pair_list",
+    "listed_positions": "listed",
+    "contacts": "contact",
+}
+
+#: Numbers of the contact of a robot, as the kernels read them.
+CONTACT = ("thickness", "stiffness", "static", "kinetic", "damping", "within")
+#: The part of the median length of its springs that surfaces keep as distance.
+THICKNESS = 0.04
+#: Pairs that the list of candidates has room for, for each feature that may collide.
+ROOM = 24
+
+
+def surface_edges(robot: Robot) -> np.ndarray:
+    """Edges of the triangles of a body, each once, shape (E, 2); its springs if it has no faces."""
+    if len(robot.faces) == 0:
+        return np.asarray(robot.springs)
+    sides = np.concatenate([robot.faces[:, [0, 1]], robot.faces[:, [1, 2]], robot.faces[:, [2, 0]]])
+    return np.unique(np.sort(sides, axis=1), axis=0)
+
+
+def collision_counts(robot: Robot) -> dict[str, int]:
+    """Columns of the table of bundles that count."""
+    edges, triangles = len(surface_edges(robot)), len(robot.faces)
+    features = robot.n_masses + triangles + edges
+    return {"triangles": triangles, "edges": edges, "capacity": ROOM * features}
+
+
+def collision_buffers(
+    robot: Robot, bodies: np.ndarray, collisions: Collisions
+) -> dict[str, np.ndarray]:
+    """The buffers of the collisions of one robot, or of one world.
+
+    Args:
+        robot: All bodies as one.
+        bodies: The body of each mass, shape (M,).
+        collisions: How they collide.
+    """
+    edges, masses = surface_edges(robot), robot.n_masses
+    ends = np.concatenate([robot.springs, robot.springs[:, ::-1]])
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    rows = np.concatenate([[0], np.cumsum(np.bincount(ends[:, 0], minlength=masses))])
+    median = float(np.median(robot.lengths)) if robot.n_springs else 0.0
+    thickness = collisions.thickness or THICKNESS * median
+    features = masses + len(robot.faces) + len(edges)
+    pairs = np.zeros(1 + features + 2 * ROOM * features, np.int32)
+    pairs[0] = -1  # not looked up yet
+    pairs[1 : 1 + features] = np.arange(features)
+    contact = (
+        thickness,
+        collisions.stiffness,
+        collisions.static_friction,
+        collisions.kinetic_friction,
+        collisions.damping,
+        float(collisions.within),
+    )
+    return {
+        "triangles": robot.faces.ravel(),
+        "edges": edges.ravel(),
+        "bodies": bodies,
+        "near_rows": rows,
+        "nears": ends[:, 1],
+        "pair_lists": pairs,
+        "listed_positions": np.zeros(3 * masses),
+        "contacts": np.array(contact),
+    }
