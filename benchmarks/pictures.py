@@ -100,7 +100,7 @@ class Studio:
             ws.Box(center=(0.45, 0.55, 0.08), size=(0.16, 0.3, 0.16), angle=0.4),
         )
         shown = _with(result, obstacles, body.pushed([13, 14], (0.0, -4.0, 6.0)))
-        ws.render(shown, self.figures / "scene.png", color="material", frame=21)
+        ws.render(shown, self.figures / "scene.png", color="material", legend=True, frame=21)
 
     # -- of benchmarks -------------------------------------------------------------------------
 
@@ -111,7 +111,7 @@ class Studio:
     def stability(self) -> None:
         """Which steps are stable."""
         figure = self.figures / "stability.png"
-        _do(HERE / "stability.py", "--figure", figure, "--resolution", 48, "--soak", 0)
+        _do(HERE / "stability.py", "--figure", figure, "--resolution", 48, "--soak", 0, "--rest", 0)
 
     def peers(self) -> None:
         """Springs per second of all programs; the first run makes their environments."""

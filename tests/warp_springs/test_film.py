@@ -16,6 +16,7 @@ from warp_springs.view.actors import actors_of, between
 from warp_springs.view.camera import Camera
 from warp_springs.view.directing import Director, Setting
 from warp_springs.view.film import Film
+from warp_springs.view.legend import rows_of
 from warp_springs.view.look import Cut, Look
 from warp_springs.view.picture import picture
 from warp_springs.view.rasteriser import Rasteriser
@@ -253,6 +254,28 @@ def test_colours_say_what_they_promise(walk):
     (actor,) = actors_of(result, [0], Look(color="material"), None, film=True)
     np.testing.assert_allclose(actor.colors(0.0)[1], ws.materials.BONE.rgb, rtol=1e-6)
     np.testing.assert_allclose(actor.colors(0.0)[2], ws.materials.MUSCLE.rgb, rtol=1e-6)
+
+
+def test_the_legend_says_what_the_colours_mean(walk):
+    (actor,) = actors_of(walk, [0], Look(), None, film=True)
+    rows = rows_of([actor], Look())
+    force = np.abs(walk.robots[0].tension(walk.frames(0), walk.times))
+    assert rows[0][1] == f"stretched: {np.percentile(force, 95):.3g} N or more"
+    assert rows[1] == (appearance.NEUTRAL, "relaxed")
+    assert [w for _, w in rows_of([actor, actor], Look())] == ["stretched", "relaxed", "compressed"]
+    (actor,) = actors_of(walk, [0], Look(color="actuation"), None, film=True)
+    words = rows_of([actor], Look(color="actuation"))[0][1]
+    share = 100 * 0.006 / walk.robots[0].rest_length.min()
+    assert float(words.split()[-2]) == pytest.approx(share, rel=0.02)
+    bone = dataclasses.replace(actor, body=actor.body.made_of(ws.materials.BONE))
+    assert rows_of([bone], Look(color="material")) == [(ws.materials.BONE.rgb, "bone")]
+    assert rows_of([actor], Look(color="plain")) == []
+    size = (640, 360)
+    plain = picture(walk, robots=0, size=size)
+    changed = (picture(walk, robots=0, size=size, legend=True) != plain).any(axis=2)
+    assert changed[-70:, -250:].any()
+    changed[-70:, -250:] = False
+    assert not changed.any()
 
 
 def pixel(pixels, camera, place, size):

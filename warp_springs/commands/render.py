@@ -61,6 +61,8 @@ class RenderCommand:
     """One text for each robot."""
     caption: str | None = None
     """A text in the upper left corner."""
+    legend: bool = False
+    """Whether to say in the lower right corner what the colours mean."""
     fps: float = 30.0
     """Pictures per second of a film."""
     speed: float = 1.0

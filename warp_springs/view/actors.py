@@ -39,6 +39,7 @@ class Actor:
         clock: The same, but standing still from when the robot was stopped [s], (F,).
         frames: Positions [m], (F, M, 3), all finite.
         paint: Colours of its bars.
+        scale: What is shown in full colour: a force [N] or a strain; None: colours have no scale.
         bar: Radius of its bars [m].
         ball: Radius of its spheres [m].
         broken: When each of its springs broke [s], (S,); NaN for those that hold.
@@ -51,6 +52,7 @@ class Actor:
     clock: FloatArray
     frames: FloatArray
     paint: Paint
+    scale: float | None
     bar: float
     ball: float
     broken: FloatArray
@@ -184,12 +186,12 @@ def _actor(
     if not np.isfinite(frames).all():
         raise ValueError(f"robot {index}: its positions are not finite, so it cannot be shown")
     bar, ball = appearance.drawn_radii(body.lengths)
-    paint = _paint(body, look.color, *(known or (frames, clock)), fixed)
+    paint, scale = _paint(body, look.color, *(known or (frames, clock)), fixed)
     touching = result.scene.ground is not None or bool(result.scene.obstacles)
     calm = _CALM if touching else 0.0
     thick = look.thickness
     broken = result.broken(index)
-    return Actor(body, times, clock, frames, paint, bar * thick, ball * thick, broken, calm)
+    return Actor(body, times, clock, frames, paint, scale, bar * thick, ball * thick, broken, calm)
 
 
 def _paint(
@@ -198,18 +200,18 @@ def _paint(
     frames: FloatArray,
     clock: FloatArray,
     fixed: NDArray[np.float32] | None,
-) -> Paint:
-    """Return the colours of a robot's bars; their scale follows from all its frames."""
+) -> tuple[Paint, float | None]:
+    """Return the colours of a robot's bars, and their scale, which follows from all its frames."""
     step = max(1, len(clock) // _FRAMES_FOR_SCALE)
     if color == "stress":
         scale = appearance.stress_scale(body.tension(frames[::step], clock[::step]))
-        return lambda positions, time: appearance.stress_color(body.tension(positions, time), scale)
+        return (lambda p, t: appearance.stress_color(body.tension(p, t), scale)), scale
     if color == "actuation" and body.is_actuated:
         largest = max(float(np.abs(_strain(body, clock[::step])).max()), 1e-9)
-        return lambda _, time: appearance.actuation_color(_strain(body, time), largest)
+        return (lambda _, t: appearance.actuation_color(_strain(body, t), largest)), largest
     if fixed is None:
         fixed = np.tile(np.float32(appearance.NEUTRAL), (body.n_springs, 1))
-    return lambda *_: fixed
+    return (lambda *_: fixed), None
 
 
 def _strain(body: Robot, time: float | FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warp_springs.view import labels as texts
 from warp_springs.view.actors import Actor, FloatArray, actors_of
 from warp_springs.view.directing import Director, Setting, put_on_grid, spread
+from warp_springs.view.legend import Row, draw_legend, rows_of
 from warp_springs.view.look import Cut, Look
 from warp_springs.view.rasteriser import Rasteriser
 from warp_springs.view.scenery import draw_scene
@@ -195,10 +196,13 @@ class Film:
         """
         self.size, self.fps, self._cut = rasteriser.size, cut.fps, cut
         self._caption = look.caption
+        self._legend: list[Row] = []
         labels = texts.checked_labels(look.labels, len(robots))
         actors = actors_of(result, robots, look, frame, film=moving)
         self.times = _times(actors[0].times, cut) if moving else actors[0].times
         self.cycle = max((a.cycle for a in actors if math.isfinite(a.cycle)), default=math.inf)
+        if look.legend:
+            self._legend = rows_of(actors, look)
         layout = look.layout or _usual_layout(result, len(robots))
         setting = Setting(self.times, result.scene, look, cut)
         if layout != "panel" or len(actors) == 1:
@@ -227,10 +231,11 @@ class Film:
         return pixels
 
     def _write(self, pixels: Pixels, time: float) -> None:
-        """Write the caption above and the clock below."""
+        """Write the caption above, the clock and the legend below."""
         letters = max(_SMALLEST_LETTERS, round(self.size[1] * _LETTERS_PER_HEIGHT))
         if self._caption:
             texts.lay_over(pixels, texts.text_image(self._caption, letters), letters, letters)
+        draw_legend(pixels, self._legend, letters)
         if self._cut.clock and len(self.times) > 1:
             words = f"{time:.2f} s" + _speed_words(self._cut.speed)
             image = texts.text_image(words, letters)

@@ -38,6 +38,7 @@ class Look:
     elevation: float | None = None
     labels: Sequence[str] | None = None
     caption: str | None = None
+    legend: bool = False
 
     def __post_init__(self) -> None:
         check_choice("color", self.color, COLORS)

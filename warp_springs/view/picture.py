@@ -45,6 +45,7 @@ def render(
     elevation: float | None = None,
     labels: Sequence[str] | None = None,
     caption: str | None = None,
+    legend: bool = False,
     fps: float = 30.0,
     speed: float = 1.0,
     start: float | None = None,
@@ -87,6 +88,7 @@ def render(
         elevation: How high it stands above the horizon, degrees.
         labels: One text for each robot, written below it or into its tile.
         caption: A text in the upper left corner.
+        legend: Whether to say in the lower right corner what the colours mean.
         fps: Pictures per second of a film.
         speed: Seconds of the run per second of the film: 0.25 is slow motion. Between recorded
             frames, motion is a smooth curve through them.
