@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -31,17 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["REPORT", "write_report"]
 
 REPORT = "report.html"
-MOST_FILM = 900_000
-"""Bytes of a film in the report; the report is to stay below 5 MB."""
-MOST_PAGE = 1_600_000
-"""Bytes of the page in the report."""
-FILMS = (
-    ("mp4", (640, 360), 25.0),
-    ("mp4", (480, 270), 20.0),
-    ("webp", (480, 270), 12.5),
-    ("webp", (320, 180), 10.0),
-)
-"""How a film is tried until it is small enough: kind, size in pixels, pictures per second."""
 FILES = {
     "champion.usdc": "animation of the champion, OpenUSD",
     "zoo.usdc": "animation of the best, side by side",
@@ -194,20 +181,21 @@ def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
 def _watch(report: ws.Document, subject: Subject) -> None:
 
     report.section("Watch")
-    zoo, cycles = subject.zoo, _cycles(subject)
-    films = [_film(report, subject, 0, f"The best, #{zoo[0]}, {cycles}.")]
+    film, zoo, cycles = subject.film, subject.zoo, _cycles(subject)
+    duration = _film_duration(subject)
+    part = {"start": float(film.times[-1]) - duration, "duration": duration}
+    films = [report.film(film, f"The best, #{zoo[0]}, {cycles}.", 0, **part)]
     if len(zoo) > 1:
         words = f"The {len(zoo)} best side by side, {cycles}."
-        films.append(_film(report, subject, range(len(zoo)), words))
+        films.append(report.film(film, words, range(len(zoo)), **part))
     report.row(*films)
-    page, count = _page(subject)
-    robots = "The best robot" if count == 1 else f"The {count} best robots"
     report.row(
-        report.page(
-            page,
-            f"{robots} to turn, slow down and take apart: drag, zoom, choose one, colour its "
-            "springs by stress, material or actuation; press ? for the keys.",
-            printed="The file holds a page here in which the robots move; open it in a browser.",
+        report.player(
+            film,
+            "The best, to walk around.",
+            names={place: f"#{individual}" for place, individual in enumerate(zoo)},
+            custom_data=dict(enumerate(_page_facts(subject))),
+            title=f"{subject.run.config.name}: the best",
         )
     )
 
@@ -286,13 +274,8 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
 
     report.section("Zoo")
     labels = [f"#{i}   {subject.fitness(i):.2f}" for i in subject.zoo]
-    report.row(
-        report.image(
-            _zoo_picture(subject, labels),
-            f"The {len(labels)} best different individuals at the end of their trial.",
-            kind="webp",
-        )
-    )
+    words = f"The {len(labels)} best different individuals at the end of their trial."
+    report.row(report.still(subject.film, words, labels=labels))
     if subject.finalists:
         report.table(
             [
@@ -304,21 +287,6 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
              "left from perturbed starts", "survives"),
             caption=f"Second look: {demotions(subject.finalists)}.",
         )  # fmt: skip
-
-
-def _zoo_picture(subject: Subject, labels: Sequence[str]) -> bytes:
-    """Each of the best in a tile of its own, as WebP: a tenth of a PNG."""
-    from PIL import Image
-
-    import warp_springs as ws
-
-    with tempfile.TemporaryDirectory() as folder:
-        layout = "panel" if len(labels) > 1 else None
-        path = ws.render(subject.film, Path(folder, "zoo.png"), labels=labels, layout=layout,
-                         size=(1280, 800))  # fmt: skip
-        with Image.open(path) as picture, io.BytesIO() as target:
-            picture.save(target, format="WEBP", quality=88)
-            return target.getvalue()
 
 
 def _comparison(report: ws.Document, subject: Subject, several: Sequence[Group]) -> None:
@@ -395,53 +363,10 @@ def _files(report: ws.Document, run: Run, path: Path) -> None:
     report.links(links)
 
 
-def _film(report: ws.Document, subject: Subject, robots: int | Sequence[int], words: str) -> str:
-    """A film of the last cycles of some robots, as part of a row.
-
-    It is H.264 where there is an encoder, an animated picture elsewhere.
-    """
-    import warp_springs as ws
-
-    result = subject.film
-    duration = _film_duration(subject)
-    start = float(result.times[-1]) - duration
-    with tempfile.TemporaryDirectory() as folder:
-        data = b""
-        for kind, size, fps in FILMS:
-            path = Path(folder, f"film.{kind}")
-            with suppress(RuntimeError):  # no encoder for mp4
-                ws.render(result, path, robots=robots, size=size, fps=fps, start=start,
-                          duration=duration, clock=False)  # fmt: skip
-                data = path.read_bytes()
-                if len(data) <= MOST_FILM:
-                    break
-    return report.video(data, words) if kind == "mp4" else report.image(data, words, kind=kind)
-
-
 def _film_duration(subject: Subject) -> float:
     """Seconds that a film shows: some cycles, or all where there are fewer."""
     times = subject.film.times
     return min(FILM_CYCLES * subject.run.config.encoding.period, float(times[-1] - times[0]))
-
-
-def _page(subject: Subject) -> tuple[str, int]:
-    """The page with as many of the best as keep it small, and how many these are."""
-    import warp_springs as ws
-
-    facts = list(_page_facts(subject))
-    count = len(subject.zoo)
-    while True:
-        shown = range(count)
-        page = ws.html_page(
-            subject.film,
-            robots=shown,
-            names={place: f"#{subject.zoo[place]}" for place in shown},
-            custom_data={place: facts[place] for place in shown},
-            title=f"{subject.run.config.name}: the best",
-        )
-        if len(page) <= MOST_PAGE or count == 1:
-            return page, count
-        count = max(1, min(count - 1, int(count * MOST_PAGE / len(page))))
 
 
 def _cycles(subject: Subject) -> str:

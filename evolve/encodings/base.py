@@ -20,7 +20,7 @@ Genomes = Any
 class EncodingSettings(BaseModel):
     """What every encoding can be told; each adds its own, and a field `type` with its name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     period: float = Field(1.0, gt=0.0)
     """Length of an actuation cycle [s], the same for every robot and every spring."""

@@ -23,7 +23,7 @@ NOBODY = -1
 class OptimizerSettings(BaseModel):
     """What an optimizer can be told; each adds its own, and a field `type` with its name."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     @property
     def measures(self) -> tuple[str, ...]:

@@ -7,20 +7,28 @@ import html
 import io
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warp_springs.io.outputs import checked_output, written_beside
+from warp_springs.view import exhibits
 from warp_springs.view.page import SUFFIXES, asset
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from warp_springs.result import Result
+
 __all__ = ["Document"]
 
 Cell = str | int | float
+
+MOST_FILM = 900_000
+"""Bytes that a film in a document takes at most."""
+MOST_PAGE = 1_600_000
+"""Letters that a page of robots in a document takes at most, unless it shows one robot."""
 
 _NAMED_GROUP = re.compile(r' id="[A-Za-z][\w.]*_\d+"')
 """Names that matplotlib gives to the parts of every figure, the same in each; nothing uses them."""
@@ -147,6 +155,76 @@ class Document:
         inside = f'{frame} srcdoc="{html.escape(text)}"></iframe>'
         note = f'<p class="printed">{html.escape(printed)}</p>' if printed else ""
         return _figure(inside, caption, "page") + note
+
+    def film(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: int | Sequence[int] | None = None,
+        start: float | None = None,
+        duration: float | None = None,
+    ) -> str:
+        """A film of recorded robots; H.264 with the extra ``video``, else an animated picture.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows.
+            robots: Who is in it; all that were recorded by default.
+            start: Where in the run it starts [s]; default its first frame.
+            duration: How much of the run it shows [s]; default all of it.
+        """
+        data, kind = exhibits.film(result, robots, MOST_FILM, start, duration)
+        put = self.video if kind == "mp4" else self.image
+        return put(data, caption, kind=kind)
+
+    def player(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: Sequence[int] | None = None,
+        names: Mapping[int, str] | None = None,
+        custom_data: Mapping[int, Mapping[str, Any]] | None = None,
+        title: str = "",
+    ) -> str:
+        """The page of `ws.html_page` in a frame, with as many of the robots as keep it small.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows; how to use it is added.
+            robots: Who is on it, the most important first; all that were recorded by default.
+            names: As in `ws.html_page`.
+            custom_data: As there.
+            title: As there.
+        """
+        shown = list(result.recorded if robots is None else robots)
+        page, count = exhibits.player(
+            result, shown, MOST_PAGE, names or {}, custom_data or {}, title or self.title
+        )
+        left_out = f" The first {count} of {len(shown)}." if count < len(shown) else ""
+        return self.page(
+            page,
+            f"{caption}{left_out} Drag to turn, zoom, slow down, choose a robot, colour its "
+            "springs by stress, material or actuation; press ? for the keys.",
+            printed="The file holds a page here in which the robots move; open it in a browser.",
+        )
+
+    def still(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: Sequence[int] | None = None,
+        labels: Sequence[str] | None = None,
+    ) -> str:
+        """A picture of the last frame, each robot in a tile of its own.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows.
+            robots: Who is on it; all that were recorded by default.
+            labels: A text for each.
+        """
+        shown = list(result.recorded if robots is None else robots)
+        return self.image(exhibits.still(result, shown, labels), caption, kind="webp")
 
     # -- the end -----------------------------------------------------------------------------------
 
