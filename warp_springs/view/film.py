@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warp_springs.view import labels as texts
 from warp_springs.view.actors import Actor, FloatArray, actors_of
 from warp_springs.view.directing import Director, Setting, put_on_grid, spread
-from warp_springs.view.legend import Row, draw_legend, rows_of
+from warp_springs.view.legend import Row, draw_legend, rows_of, strip_height
 from warp_springs.view.look import Cut, Look
 from warp_springs.view.rasteriser import Rasteriser
 from warp_springs.view.scenery import draw_scene
@@ -65,7 +65,7 @@ class Shot:
         self.actors, self._setting = actors, setting
         self._rasteriser, self._tile = rasteriser, tile
         self._floor = setting.scene.ground is not None
-        letters = max(_SMALLEST_LETTERS, round(rasteriser.size[1] * _LETTERS_PER_HEIGHT))
+        letters = _letters(rasteriser.size[1])
         letters = max(letters, 14) if tile else letters
         self._images = [texts.text_image(label, letters) for label in labels or ()]
         self._drops = np.zeros(len(actors))
@@ -232,10 +232,10 @@ class Film:
 
     def _write(self, pixels: Pixels, time: float) -> None:
         """Write the caption above, the clock and the legend below."""
-        letters = max(_SMALLEST_LETTERS, round(self.size[1] * _LETTERS_PER_HEIGHT))
+        letters = _letters(self.size[1])
         if self._caption:
             texts.lay_over(pixels, texts.text_image(self._caption, letters), letters, letters)
-        draw_legend(pixels, self._legend, letters)
+        draw_legend(pixels, self._legend, letters, in_line=len(self.shots) > 1)
         if self._cut.clock and len(self.times) > 1:
             words = f"{time:.2f} s" + _speed_words(self._cut.speed)
             image = texts.text_image(words, letters)
@@ -250,21 +250,29 @@ def _panel(
     labels: Sequence[str] | None,
 ) -> Iterator[tuple[Shot, slice, slice]]:
     """Tiles of a panel in the order of reading: a shot of one robot each, and its rows, columns."""
-    columns = _columns(len(actors), rasteriser.size)
+    whole = rasteriser.size
+    strip = strip_height(_letters(whole[1])) if setting.look.legend else 0
+    size = whole[0], whole[1] - strip
+    columns = _columns(len(actors), size)
     rows = math.ceil(len(actors) / columns)
-    width = (rasteriser.size[0] - (columns - 1) * _GUTTER) // columns
-    height = (rasteriser.size[1] - (rows - 1) * _GUTTER) // rows
+    width = (size[0] - (columns - 1) * _GUTTER) // columns
+    height = (size[1] - (rows - 1) * _GUTTER) // rows
     if min(width, height) < 16:
-        raise ValueError(f"size: {rasteriser.size} is too small for a panel of {len(actors)}")
+        raise ValueError(f"size: {whole} is too small for a panel of {len(actors)}")
     small = rasteriser.of_size((width, height), _TILE_MAP)
-    left = (rasteriser.size[0] - columns * width - (columns - 1) * _GUTTER) // 2
-    top = (rasteriser.size[1] - rows * height - (rows - 1) * _GUTTER) // 2
+    left = (size[0] - columns * width - (columns - 1) * _GUTTER) // 2
+    top = (size[1] - rows * height - (rows - 1) * _GUTTER) // 2
     for i, actor in enumerate(actors):
         row, column = divmod(i, columns)
         y, x = top + row * (height + _GUTTER), left + column * (width + _GUTTER)
         words = None if labels is None else [labels[i]]
         shot = Shot([actor], setting, small, labels=words, tile=True)
         yield shot, slice(y, y + height), slice(x, x + width)
+
+
+def _letters(height: int) -> int:
+    """Height of the letters in a picture of a height, both in pixels."""
+    return max(_SMALLEST_LETTERS, round(height * _LETTERS_PER_HEIGHT))
 
 
 def _columns(count: int, size: tuple[int, int]) -> int:

@@ -34,24 +34,36 @@ def rows_of(actors: Sequence[Actor], look: Look) -> list[Row]:
     return []
 
 
-def draw_legend(pixels: NDArray[np.uint8], rows: Sequence[Row], letters: int) -> None:
+def draw_legend(
+    pixels: NDArray[np.uint8], rows: Sequence[Row], letters: int, *, in_line: bool
+) -> None:
     """Draw rows into the lower right corner of a picture, (H, W, 3) uint8, in place.
 
     Args:
         pixels: The picture.
         rows: Colours and words, from the top.
         letters: Height of the letters in pixels.
+        in_line: Beside each other instead of below each other.
     """
     images = [texts.text_image(words, letters) for _, words in rows]
-    wide = max((image.shape[1] for image in images), default=0)
-    step = round(1.6 * letters)
-    left = pixels.shape[1] - letters - wide
-    top = pixels.shape[0] - letters // 2 - step * len(rows)
-    for k, ((color, _), image) in enumerate(zip(rows, images, strict=True)):
-        y = top + k * step
-        swatch = pixels[max(y, 0) : y + letters, max(left - 2 * letters, 0) : max(left - 6, 0)]
+    widths = np.array([image.shape[1] for image in images], int)
+    height, width = pixels.shape[:2]
+    step = strip_height(letters)
+    if in_line:  # from the right edge to the left
+        lefts = width - letters - np.cumsum((widths + 3 * letters)[::-1])[::-1] + 3 * letters
+        tops = np.full(len(rows), height - step + (step - letters) // 2)
+    else:
+        lefts = np.full(len(rows), width - letters - widths.max(initial=0))
+        tops = height - letters // 2 - step * np.arange(len(rows), 0, -1)
+    for (color, _), image, left, top in zip(rows, images, lefts, tops, strict=True):
+        swatch = pixels[max(top, 0) : top + letters, max(left - 2 * letters, 0) : max(left - 6, 0)]
         swatch[:] = np.rint(255 * appearance.to_screen(color))
-        texts.lay_over(pixels, image, left, y + (letters - image.shape[0]) // 2)
+        texts.lay_over(pixels, image, int(left), int(top) + (letters - image.shape[0]) // 2)
+
+
+def strip_height(letters: int) -> int:
+    """Height in pixels of a line of the legend for letters of a height."""
+    return round(1.6 * letters)
 
 
 def _three(above: ArrayLike, below: ArrayLike, words: tuple[str, str, str]) -> list[Row]:
