@@ -21,6 +21,7 @@ NAMES = (
     "ten-cubes",
     "tetrahedron",
     "soft-legs",
+    "cable-pendulum",
     "worm",
     "slope",
 )

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from warp_springs.config import SceneFile
     from warp_springs.result import Result
 
-__all__ = ["bounces", "findings", "peak_deceleration"]
+__all__ = ["bounces", "findings", "peak_deceleration", "period", "predicted_period", "slack"]
 
 Row = tuple[str, str]
 
@@ -31,6 +31,7 @@ def findings(config: SceneFile, result: Result) -> list[Row]:
         "worm": _breathing,
         "soft-legs": _legs,
         "ten-cubes": _rest,
+        "cable-pendulum": _pendulum,
     }
     return measured[config.name](config, result) if config.name in measured else []
 
@@ -85,4 +86,46 @@ def _rest(config: SceneFile, result: Result) -> list[Row]:
     return [
         ("kinetic energy left", f"at most {1000.0 * kinetic.max():.2g} mJ"),
         ("bounces", ", ".join(str(bounces(result, i)) for i in result.recorded)),
+    ]
+
+
+def period(result: Result, robot: int = 0) -> float:
+    """Mean time between two passages of the heaviest mass below its hook, the same way [s]."""
+    body = result.robots[robot]
+    side = result.frames(robot)[:, np.argmax(body.masses), 0] - body.elements.bonds.points[0, 0]
+    before = np.flatnonzero((side[:-1] > 0.0) & (side[1:] <= 0.0))
+    share = side[before] / (side[before] - side[before + 1])
+    passages = result.times[before] + share * np.diff(result.times)[before]
+    return float(np.diff(passages).mean()) if len(passages) > 1 else math.nan
+
+
+def predicted_period(result: Result, robot: int = 0) -> float:
+    """Of a compound pendulum that hangs straight, at a small angle [s].
+
+    2 pi sqrt(I / (g sum of m r)) (1 + a^2 / 16) with the moment of inertia I about the hook, for a
+    swing of the angle a; r are the distances from the hook as the bob stretches the cable.
+    """
+    body = result.robots[robot]
+    arms, bob = body.positions - body.elements.bonds.points[0], int(np.argmax(body.masses))
+    swing = math.atan2(abs(arms[bob, 0]), -arms[bob, 2])
+    g = -result.scene.gravity[2]
+    stretch = body.masses[bob] * g * float((1.0 / body.stiffness).sum())
+    r = np.linalg.norm(arms, axis=1) * (1.0 + stretch / float(body.rest_length.sum()))
+    length = float(body.masses @ r**2 / (body.masses @ r))
+    return 2.0 * math.pi * math.sqrt(length / g) * (1.0 + swing**2 / 16.0)
+
+
+def slack(result: Result, robot: int) -> float:
+    """Largest share of a cable's links that hung slack at one time."""
+    body, frames = result.robots[robot], result.frames(robot)
+    lengths = np.linalg.norm(np.diff(frames[:, body.springs], axis=2)[:, :, 0], axis=2)
+    return float((lengths < body.rest_length).mean(axis=1).max())
+
+
+def _pendulum(config: SceneFile, result: Result) -> list[Row]:
+    names = list(config.names.values())
+    return [
+        (f"{names[0]}: period", f"{period(result):.4f} s"),
+        (f"{names[0]}: predicted", f"{predicted_period(result):.4f} s"),
+        (f"{names[1]}: links slack at most", f"{100.0 * slack(result, 1):.0f} %"),
     ]
