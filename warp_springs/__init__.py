@@ -65,6 +65,7 @@ __all__ = [
     "shapes",
     "stable_dt",
     "write_mesh",
+    "write_report",
 ]
 
 try:
@@ -85,6 +86,7 @@ _LAZY = {
     "read_mesh": ("warp_springs.io.mesh_read", "read_mesh"),
     "render": ("warp_springs.view.picture", "render"),
     "write_mesh": ("warp_springs.io.mesh_write", "write_mesh"),
+    "write_report": ("warp_springs.view.report", "write_report"),
 }
 
 

@@ -9,6 +9,7 @@ from warp_springs.commands.demo import DemoCommand
 from warp_springs.commands.export import ExportCommand
 from warp_springs.commands.info import InfoCommand
 from warp_springs.commands.render import RenderCommand
+from warp_springs.commands.report import ReportCommand
 from warp_springs.commands.run import RunCommand
 
 __all__ = ["COMMANDS", "main"]
@@ -19,6 +20,7 @@ COMMANDS = {
     "export": ExportCommand,
     "info": InfoCommand,
     "render": RenderCommand,
+    "report": ReportCommand,
     "run": RunCommand,
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from warp_springs.config import SceneFile
     from warp_springs.result import Result
 
-__all__ = ["as_markdown", "energy_change", "figures", "outcome", "parameters"]
+__all__ = ["as_markdown", "energy_change", "figures", "of_result", "outcome", "parameters"]
 
 Row = tuple[str, str]
 
@@ -76,13 +77,33 @@ _DIMENSIONLESS = ("water.density",)
 
 def parameters(config: SceneFile, result: Result) -> list[Row]:
     """Every parameter of a scene file, and the figures of the robots that it makes."""
-    from warp_springs import __version__
     from warp_springs.config import tables
 
     data = {k: v for k, v in tables(config).items() if k not in ("name", "about")}
-    rows = list(_flat(data, ()))
-    rows += _robots(config, result)
-    rows += [
+    return [*_flat(data, ()), *_of_run(result, config.names)]
+
+
+def of_result(result: Result, names: Mapping[int, str]) -> list[Row]:
+    """Every parameter that a result itself knows: its world, its robots, how it was stepped."""
+    scene = dataclasses.asdict(result.scene)
+    return [*_flat(_plain({"scene": scene}), ()), *_of_run(result, names)]
+
+
+def _plain(value: Any) -> Any:
+    """Tuples and arrays as lists, and without what a scene lacks."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (tuple, list, np.ndarray)):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _of_run(result: Result, names: Mapping[int, str]) -> list[Row]:
+    """The robots of a run, and how it was stepped."""
+    from warp_springs import __version__
+
+    return [
+        *_robots(result, names),
         ("integrator", result.integrator),
         ("precision", result.precision),
         ("device", result.device),
@@ -90,7 +111,6 @@ def parameters(config: SceneFile, result: Result) -> list[Row]:
         ("steps", f"{result.steps:,}"),
         ("warp_springs", __version__),
     ]
-    return rows
 
 
 def outcome(result: Result) -> list[Row]:
@@ -157,14 +177,14 @@ def _text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _robots(config: SceneFile, result: Result) -> Iterator[Row]:
+def _robots(result: Result, names: Mapping[int, str]) -> Iterator[Row]:
     """The figures of each different robot."""
     told: dict[bytes, str] = {}
     for index, robot in enumerate(result.robots):
         key = robot.topology + robot.stiffness.tobytes() + robot.phase.tobytes()
         if key in told or len(told) == MOST_ROBOTS:
             continue
-        told[key] = name = config.names[index]
+        told[key] = name = names.get(index, f"robot {index}")
         for what, value in figures(robot):
             yield f"{name}: {what}", value
         yield f"{name}: stable step", f"{stable_dt(robot, result.scene, result.integrator):.3g} s"
