@@ -1,5 +1,6 @@
 """The libraries' processes: started in their environments, asked one after the other."""
 
+import contextlib
 import json
 import os
 import subprocess
@@ -84,9 +85,9 @@ class Fleet:
         return self._say(program.library, program.process, do=do, program=program.name, **request)
 
     def drop(self) -> None:
-        """Have all processes forget their programs."""
-        for key in list(self._processes):
-            if key[0] not in self.failed:
+        """Have all processes forget their programs; one that has ended has."""
+        for key in self._processes:
+            with contextlib.suppress(RuntimeError):
                 self._say(*key, do="drop")
 
     def _say(self, library: str, threads: int, **request) -> dict:
@@ -107,7 +108,8 @@ class Fleet:
     def stop(self) -> None:
         """End all processes."""
         for process in self._processes.values():
-            process.stdin.close()
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.close()
             process.stdout.close()
         for process in self._processes.values():
             process.wait()

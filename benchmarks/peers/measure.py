@@ -150,5 +150,10 @@ def _race(fleet, rows: list[Row], problem: Problem, rounds: int, seconds: float,
     for turn in range(rounds):
         say(f"round {turn + 1} of {rounds}")
         for row in rows:
-            _time(fleet, row, seconds)
-            row.rates.append(work * row.pace)
+            if row.failure:
+                continue
+            try:
+                _time(fleet, row, seconds)
+                row.rates.append(work * row.pace)
+            except RuntimeError as error:
+                row.failure, row.rates = str(error), []

@@ -138,6 +138,27 @@ def test_a_program_that_is_wrong_gets_no_speed(small_fleet, problem, monkeypatch
         assert not len(row.rates)
 
 
+def test_a_process_that_dies_loses_its_rows_only(problem):
+    made = fleet.Fleet()
+    try:
+        made.start(["numpy", "warp_springs"], [1], print)
+        asked = made.ask
+
+        def ask(program, do, **request):
+            if program.name == "NumPy" and do == "centers":
+                made._processes["numpy", 1].kill()
+            return asked(program, do, **request)
+
+        made.ask = ask
+        rows = measure.compare(made, measure.Truth(problem, 30), "float64", 1, 0.01, print)
+    finally:
+        made.stop()
+    dead, alive = rows
+    assert "its process ended" in dead.failure
+    assert not len(dead.rates)
+    assert len(alive.rates) == 1
+
+
 def test_a_library_that_is_not_there_is_named_and_the_others_go_on(monkeypatch):
     def python_of(library):
         if library == "jax":

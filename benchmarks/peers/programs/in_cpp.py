@@ -51,7 +51,7 @@ def build(name: str, flags: tuple[str, ...] = ()) -> Path:
     """Compile ``cpp/NAME.cpp`` unless a library of just these sources and flags is there.
 
     Returns:
-        The shared library, in ``.peers/cpp`` beside this folder's programs.
+        The shared library, in ``benchmarks/peers/.cache/cpp``.
 
     Raises:
         RuntimeError: There is no compiler, or it fails.
