@@ -41,11 +41,11 @@ from pathlib import Path
 
 import warp as wp
 
+from warp_springs.engine.layouts import BLOCK_SIZES
 from warp_springs.kernels.block import block
 from warp_springs.kernels.buffers import real_dtype
 from warp_springs.kernels.flat import launches
 from warp_springs.kernels.gather import SLICE, GatherFeatures
-from warp_springs.layouts import BLOCK_SIZES
 
 
 @dataclass(frozen=True)

@@ -42,9 +42,9 @@ class Studio:
     @cached_property
     def walkers(self) -> tuple[ws.Result, list[str]]:
         """The nine best of the walker preset, moving, and what is written beside them."""
-        from evolve.export import trial
+        from evolve.reports.export import trial
+        from evolve.reports.show import label
         from evolve.run import Run
-        from evolve.show import label
 
         if not (self.run / "learning_curve.png").exists():
             _do("-m", "evolve.cli", "run", "walker", "--out", self.run)

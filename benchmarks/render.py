@@ -21,9 +21,9 @@ import numpy as np
 
 import warp_springs as ws
 from warp_springs.view import appearance
-from warp_springs.view.film import Film
 from warp_springs.view.look import Cut, Look
-from warp_springs.view.rasteriser import TO_SUN, Rasteriser
+from warp_springs.view.pictures.film import Film
+from warp_springs.view.pictures.rasteriser import TO_SUN, Rasteriser
 
 SIZE = (1280, 720)
 FRAMES = 15

@@ -9,8 +9,8 @@ from pydantic import Field, field_validator, model_validator
 
 from evolve.encodings import ENCODINGS
 from evolve.fitness import FITNESS
+from evolve.judging.trials import AGGREGATES
 from evolve.optimizers import OPTIMIZERS
-from evolve.trials import AGGREGATES
 from warp_springs import config as configs
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ import numpy as np
 
 from evolve.config import RunConfig
 from evolve.errors import RunError, StoreError
-from evolve.judge import Simulator
+from evolve.judging.judge import Simulator
 from evolve.lock import Lock
 from evolve.search import Generation, Search, judge_together
 from evolve.store import Store, Timing

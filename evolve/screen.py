@@ -18,7 +18,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from evolve.report import clock, metric
+from evolve.reports.figures import clock, metric
 from evolve.run import Progress
 
 __all__ = ["Screen", "interruptible"]

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evolve.cluster import Cluster
 from evolve.config import RunConfig
-from evolve.judge import Here, Judge, Simulator, Ticket
+from evolve.judging.cluster import Cluster
+from evolve.judging.judge import Here, Judge, Simulator, Ticket
+from evolve.judging.pool import Pool
+from evolve.judging.scores import Scores
 from evolve.optimizers.base import Candidates, Individuals
-from evolve.pool import Pool
-from evolve.scores import Scores
 from evolve.store import Store
 from evolve.streams import Role, Streams
 

@@ -25,11 +25,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evolve.errors import StoreError
+from evolve.judging.scores import Scores
 from evolve.optimizers.base import NOBODY, Candidates
-from evolve.scores import Scores
 
 if TYPE_CHECKING:
-    from evolve.second_look import SecondLook
+    from evolve.judging.second_look import SecondLook
 
 __all__ = ["Finalist", "Record", "Store", "Timing"]
 

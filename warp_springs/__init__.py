@@ -11,7 +11,9 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 from warp_springs import materials, shapes
-from warp_springs.elements import Elements, Push, Tether, Timetable
+from warp_springs.body.elements import Elements, Push, Tether, Timetable
+from warp_springs.body.variants import Variants
+from warp_springs.body.waveform import Waveform
 from warp_springs.energy import Energy
 from warp_springs.materials import Material
 from warp_springs.result import Result
@@ -21,8 +23,6 @@ from warp_springs.simulation import Simulation
 from warp_springs.stability import Limits, Status, stable_dt
 from warp_springs.startup import quiet
 from warp_springs.surfaces import Box, Circle, HeightField, Line, Plane, Sphere, height_map
-from warp_springs.variants import Variants
-from warp_springs.waveform import Waveform
 
 __all__ = [
     "Box",
@@ -76,17 +76,17 @@ except PackageNotFoundError:  # a source tree that was never installed
 # Names whose modules need pydantic, pxr, matplotlib, meshio or Pillow: loaded on first use.
 _LAZY = {
     "config": ("warp_springs.config", None),
-    "Document": ("warp_springs.view.document", "Document"),
-    "LiveLine": ("warp_springs.view.live", "LiveLine"),
-    "LiveServer": ("warp_springs.view.live", "LiveServer"),
-    "export_html": ("warp_springs.view.page", "export_html"),
-    "export_usd": ("warp_springs.io.usd", "export_usd"),
-    "html_page": ("warp_springs.view.page", "html_page"),
+    "Document": ("warp_springs.view.pages.document", "Document"),
+    "LiveLine": ("warp_springs.view.pages.live", "LiveLine"),
+    "LiveServer": ("warp_springs.view.pages.live", "LiveServer"),
+    "export_html": ("warp_springs.view.pages.player", "export_html"),
+    "export_usd": ("warp_springs.io.usd.export", "export_usd"),
+    "html_page": ("warp_springs.view.pages.player", "html_page"),
     "plots": ("warp_springs.view.plots", None),
-    "read_mesh": ("warp_springs.io.mesh_read", "read_mesh"),
-    "render": ("warp_springs.view.picture", "render"),
-    "write_mesh": ("warp_springs.io.mesh_write", "write_mesh"),
-    "write_report": ("warp_springs.view.report", "write_report"),
+    "read_mesh": ("warp_springs.io.mesh.read", "read_mesh"),
+    "render": ("warp_springs.view.pictures.picture", "render"),
+    "write_mesh": ("warp_springs.io.mesh.write", "write_mesh"),
+    "write_report": ("warp_springs.view.pages.report", "write_report"),
 }
 
 

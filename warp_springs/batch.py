@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warp_springs.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
-from warp_springs.element_packing import (
+from warp_springs.body.elements import NONE
+from warp_springs.body.variants import Variants
+from warp_springs.engine.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
+from warp_springs.engine.element_packing import (
     PACKED_ELEMENTS,
     SHARED_ELEMENTS,
     element_buffers,
@@ -24,13 +26,8 @@ from warp_springs.element_packing import (
     spring_columns,
     traits_of,
 )
-from warp_springs.elements import NONE
-from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
-from warp_springs.kernels.dialect import native_width
-from warp_springs.kernels.lanes import Features
-from warp_springs.kernels.traits import PLAIN, Traits
-from warp_springs.method import Method
-from warp_springs.packing import (
+from warp_springs.engine.method import Method
+from warp_springs.engine.packing import (
     Strip,
     aligned,
     breathes,
@@ -44,10 +41,13 @@ from warp_springs.packing import (
     row_pairs,
     sort_rows,
 )
+from warp_springs.engine.support import refuse_unsupported
+from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
+from warp_springs.kernels.dialect import native_width
+from warp_springs.kernels.lanes import Features
+from warp_springs.kernels.traits import PLAIN, Traits
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
-from warp_springs.support import refuse_unsupported
-from warp_springs.variants import Variants
 
 __all__ = ["Batch", "Group", "Slots"]
 

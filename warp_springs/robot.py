@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_springs.elements import NONE, Elements
-from warp_springs.fields import FIELDS, require_positive, require_vector, settled
+from warp_springs.body.elements import NONE, Elements
+from warp_springs.body.fields import FIELDS, require_positive, require_vector, settled
+from warp_springs.body.tensions import rest_length_at, tension
+from warp_springs.body.verbs import Verbs
 from warp_springs.geometry import (
     FloatArray,
     IntArray,
@@ -19,16 +21,14 @@ from warp_springs.geometry import (
     rotation_matrix,
     spring_lengths,
 )
-from warp_springs.tensions import rest_length_at, tension
-from warp_springs.verbs import Verbs
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
     from pathlib import Path
 
+    from warp_springs.body.variants import Variants
     from warp_springs.materials import Material, Region
-    from warp_springs.variants import Variants
 
 __all__ = ["Robot"]
 
@@ -349,13 +349,13 @@ class Robot(Verbs):
             ValueError: Both robots are actuated with different omegas (a robot has one), or the
                 tolerance is negative or not finite.
         """
-        from warp_springs.joining import join
+        from warp_springs.body.joining import join
 
         return join(self, other, merge, tolerance)
 
     def variants(self, **stacked: ArrayLike) -> Variants:
         """N robots that share this body and differ in some fields: see `Variants`."""
-        from warp_springs.variants import Variants
+        from warp_springs.body.variants import Variants
 
         return Variants(self, stacked)
 

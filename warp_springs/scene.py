@@ -6,8 +6,8 @@ import math
 from dataclasses import InitVar, dataclass
 from typing import Literal
 
+from warp_springs.body.fields import require_vector
 from warp_springs.checks import check_choice, check_number
-from warp_springs.fields import require_vector
 from warp_springs.materials import FRICTION
 from warp_springs.surfaces import Box, HeightField, Plane, Sphere
 

@@ -11,22 +11,22 @@ from typing import Literal
 import numpy as np
 
 from warp_springs.batch import Batch
+from warp_springs.body.variants import Variants
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
+from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_named
+from warp_springs.engine.method import AUTO_DT, Method
+from warp_springs.engine.packing import aligned
+from warp_springs.engine.slices import Tape, cut, run_all
+from warp_springs.engine.support import needs_lanes
+from warp_springs.engine.worlds import Member, gathered, on_a_grid
 from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of
 from warp_springs.kernels.law import EVALUATIONS
 from warp_springs.kernels.obstacles import obstacle_tables
-from warp_springs.layouts import LAYOUTS, check_layout, choose, device_named
-from warp_springs.method import AUTO_DT, Method
-from warp_springs.packing import aligned
 from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
-from warp_springs.slices import Tape, cut, run_all
 from warp_springs.stability import Limits, Status
-from warp_springs.support import needs_lanes
-from warp_springs.variants import Variants
-from warp_springs.worlds import Member, gathered, on_a_grid
 
 __all__ = ["Simulation"]
 

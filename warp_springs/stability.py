@@ -14,12 +14,12 @@ from typing import Literal
 
 import numpy as np
 
+from warp_springs.body.elements import NONE
+from warp_springs.body.variants import Variants
 from warp_springs.checks import check_choice, check_number
-from warp_springs.elements import NONE
-from warp_springs.packing import Strip, largest, largest_change
+from warp_springs.engine.packing import Strip, largest, largest_change
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
-from warp_springs.variants import Variants
 
 __all__ = ["Limits", "Status", "certainly_unstable", "stable_dt", "stable_step"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warp_springs.body.fields import require_positive, require_vector
 from warp_springs.checks import check_number
-from warp_springs.fields import require_positive, require_vector
 from warp_springs.geometry import FloatArray, rotation_matrix
 
 __all__ = ["Box", "Circle", "HeightField", "Line", "Plane", "Sphere", "Surface", "height_map"]

@@ -15,8 +15,8 @@ from evolve.errors import RunError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from evolve.reports.show import Watch
     from evolve.run import Run
-    from evolve.show import Watch
 
 __all__ = ["Export"]
 
@@ -74,9 +74,9 @@ class Export:
 
     def _written(self, run: Run, watch: Watch) -> tuple[str, Sequence]:
         """Write what is wanted; a line about it, and the paths."""
-        from evolve.export import export, export_generation, export_robots
-        from evolve.report import verdict
-        from evolve.show import Style
+        from evolve.reports.export import export, export_generation, export_robots
+        from evolve.reports.figures import verdict
+        from evolve.reports.show import Style
 
         style = Style(self.format, self.color, self.geometry)
         if self.robots:

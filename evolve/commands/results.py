@@ -43,8 +43,8 @@ class Report:
     def __call__(self, console: Console) -> int:
         """Draw, write, and print the table."""
         import warp_springs as ws
-        from evolve.report import draw, table
-        from evolve.report_page import REPORT
+        from evolve.reports.figures import draw, table
+        from evolve.reports.page import REPORT
         from evolve.run import open_all
 
         if not self.directories:
@@ -54,7 +54,7 @@ class Report:
         out = self.directories[0] / REPORT if self.out is None else self.out
         paths = draw(runs[0])
         if not self.plots_only:
-            from evolve.report_page import write_report
+            from evolve.reports.page import write_report
 
             ws.quiet()
             with console.status("writing the report") as status:

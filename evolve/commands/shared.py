@@ -47,7 +47,7 @@ def evolve_to_the_end(
     """Evolve runs to their end, or until Ctrl-C, with everything a person wants to see."""
     import warp_springs as ws
     from evolve.fitness import UNITS
-    from evolve.report import describe
+    from evolve.reports.figures import describe
     from evolve.run import evolve_together
     from evolve.screen import Screen, interruptible
 
@@ -86,7 +86,7 @@ def _live(
     if not extras.live:
         return []
     import warp_springs as ws
-    from evolve.live import Live
+    from evolve.reports.live import Live
 
     title = f"{together[0].config.name} is evolving"
     server = stack.enter_context(ws.LiveServer(title, *ws.LiveServer.place(extras.live_at)))
@@ -103,7 +103,7 @@ def _tell_all(
 
 def _report(together: Sequence[runs.Run], folder: Path, console: Console) -> None:
     """Write the report of a run, or of all its seeds, into its folder."""
-    from evolve.report_page import REPORT, write_report
+    from evolve.reports.page import REPORT, write_report
 
     with console.status("writing the report") as status:
         written = write_report(together, folder / REPORT, progress=status.update)
@@ -112,8 +112,8 @@ def _report(together: Sequence[runs.Run], folder: Path, console: Console) -> Non
 
 def _finish(run: runs.Run, console: Console, extras: Extras) -> None:
     """Crown the champion, write everything, and say what came of the run."""
-    from evolve.export import export
-    from evolve.report import draw, results, verdict
+    from evolve.reports.export import export
+    from evolve.reports.figures import draw, results, verdict
 
     with console.status("looking twice at the best, writing animations and plots"):
         finalists, animations = export(run)
@@ -124,7 +124,7 @@ def _finish(run: runs.Run, console: Console, extras: Extras) -> None:
     print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")
     tables = []
     if extras.csv:
-        from evolve.tables import write_csv
+        from evolve.reports.tables import write_csv
 
         tables.append(write_csv(run))
     print_written([run.record_path, *tables, *animations, *plots])

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from evolve.encodings.base import Encoding, Genomes
-from evolve.scores import Scores
+from evolve.judging.scores import Scores
 from evolve.streams import Role, Streams
 
 __all__ = ["NOBODY", "Candidates", "Individuals", "Optimizer", "OptimizerSettings", "Recall"]

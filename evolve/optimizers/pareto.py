@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from evolve.scores import Scores
+from evolve.judging.scores import Scores
 
 __all__ = ["best_first", "crowding", "objectives", "ranks"]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks import cuda_static
-from warp_springs.layouts import BLOCK_SIZES
+from warp_springs.engine.layouts import BLOCK_SIZES
 
 CASES = [
     ("block", "float32", "walking", "leapfrog", True),

@@ -7,8 +7,8 @@ import pytest
 
 import warp_springs as ws
 from evolve.errors import ConfigError
-from evolve.evaluate import Evaluator
 from evolve.fitness import FITNESS, UNITS, Trial, body_diameters, measure, omegas
+from evolve.judging.evaluate import Evaluator
 from evolve.toml import load
 from tests.evolve.conftest import TINY
 

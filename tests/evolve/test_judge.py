@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from evolve.errors import ConfigError, RunError
-from evolve.judge import Judge
-from evolve.pool import Pool
+from evolve.judging.judge import Judge
+from evolve.judging.pool import Pool
+from evolve.judging.scores import Scores
 from evolve.run import Run, evolve_together
-from evolve.scores import Scores
 from evolve.search import Search, judge_together
 from evolve.toml import load
 from tests.evolve.conftest import TINY

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from evolve.encodings import ArrayGenomes
+from evolve.judging.scores import Scores
 from evolve.optimizers import NOBODY, OPTIMIZERS, Individuals, Optimizer
 from evolve.optimizers.selection import SelectionSettings, select
-from evolve.scores import Scores
 from evolve.streams import Streams
 
 LEARNERS = [name for name in OPTIMIZERS if name != "random"]

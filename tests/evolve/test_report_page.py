@@ -8,22 +8,22 @@ import sqlite3
 import numpy as np
 import pytest
 
-from evolve.comparison import groups
 from evolve.config import RunConfig
-from evolve.diversity import diversity
 from evolve.errors import RunError
-from evolve.export import crown
-from evolve.findings import findings
-from evolve.parameters import parameters
-from evolve.plots import figure, performance
-from evolve.report_page import write_report
+from evolve.reports.comparison import groups
+from evolve.reports.diversity import diversity
+from evolve.reports.export import crown
+from evolve.reports.findings import findings
+from evolve.reports.page import write_report
+from evolve.reports.parameters import parameters
+from evolve.reports.plots import figure, performance
+from evolve.reports.tables import write_csv
 from evolve.run import Run
 from evolve.store import Finalist, Record, Store
-from evolve.tables import write_csv
 from evolve.toml import load
 from tests.chromium import Browser
 from tests.evolve.conftest import TINY
-from warp_springs.view import exhibits
+from warp_springs.view.pages import exhibits
 
 
 @pytest.fixture(scope="module")

@@ -6,15 +6,15 @@ import numpy as np
 
 import warp_springs as ws
 from evolve.config import RunConfig, SecondLookConfig
-from evolve.evaluate import Evaluator
-from evolve.export import crown
-from evolve.report import verdict
+from evolve.judging.evaluate import Evaluator
+from evolve.judging.second_look import quantile, share
+from evolve.judging.trials import perturbed
+from evolve.reports.export import crown
+from evolve.reports.figures import verdict
 from evolve.run import Run
-from evolve.second_look import quantile, share
 from evolve.store import Store
 from evolve.streams import Role, Streams
 from evolve.toml import load
-from evolve.trials import perturbed
 from tests.evolve.conftest import TINY
 
 NO_PERTURBATION = {

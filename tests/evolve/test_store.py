@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from evolve.errors import StoreError
+from evolve.judging.scores import Scores
+from evolve.judging.second_look import SecondLook
 from evolve.lock import Lock
 from evolve.optimizers import NOBODY, Candidates
-from evolve.scores import Scores
-from evolve.second_look import SecondLook
 from evolve.store import APPLICATION_ID, SCHEMA_VERSION, Finalist, Store, Timing
 
 DESCRIPTORS = ("height", "a name with spaces")

@@ -11,8 +11,8 @@ from warp_springs.config import SceneFile, parse
 from warp_springs.demos.findings import bounces, findings, peak_deceleration
 from warp_springs.demos.slope import trials
 from warp_springs.materials import FRICTION
-from warp_springs.outputs import write_outputs
-from warp_springs.parameters import energy_change
+from warp_springs.view.outputs import write_outputs
+from warp_springs.view.parameters import energy_change
 
 
 def shell(folder, *arguments):

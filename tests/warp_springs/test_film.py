@@ -10,16 +10,17 @@ import pytest
 from PIL import Image
 
 import warp_springs as ws
-from warp_springs.view import appearance, video
-from warp_springs.view import film as film_module
-from warp_springs.view.actors import actors_of, between
-from warp_springs.view.camera import Camera
-from warp_springs.view.directing import Director, Setting
-from warp_springs.view.film import Film
-from warp_springs.view.legend import rows_of
+from warp_springs.view import appearance
 from warp_springs.view.look import Cut, Look
-from warp_springs.view.picture import picture
-from warp_springs.view.rasteriser import Rasteriser
+from warp_springs.view.pictures import film as film_module
+from warp_springs.view.pictures import video
+from warp_springs.view.pictures.actors import actors_of, between
+from warp_springs.view.pictures.camera import Camera
+from warp_springs.view.pictures.directing import Director, Setting
+from warp_springs.view.pictures.film import Film
+from warp_springs.view.pictures.legend import rows_of
+from warp_springs.view.pictures.picture import picture
+from warp_springs.view.pictures.rasteriser import Rasteriser
 
 SIZE = (160, 90)
 

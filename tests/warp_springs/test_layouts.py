@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from warp_springs import crowd
+from warp_springs.engine import crowd
 
 KINDS = ("Threads", "Launches", "Blocks")
 DT = 5e-4

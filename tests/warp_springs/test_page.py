@@ -12,7 +12,7 @@ import pytest
 
 import warp_springs as ws
 from tests.chromium import Browser
-from warp_springs.view.page_scene import LEVELS, Block, described
+from warp_springs.view.pages.scene import LEVELS, Block, described
 
 FPS = 30
 

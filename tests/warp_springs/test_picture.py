@@ -8,13 +8,14 @@ import pytest
 from PIL import Image
 
 import warp_springs as ws
-from warp_springs.view import appearance, picture
-from warp_springs.view.actors import actors_of
-from warp_springs.view.camera import Camera
-from warp_springs.view.directing import put_on_grid
+from warp_springs.view import appearance
 from warp_springs.view.look import Look
-from warp_springs.view.rasteriser import Rasteriser
-from warp_springs.view.scenery import draw_scene
+from warp_springs.view.pictures import picture
+from warp_springs.view.pictures.actors import actors_of
+from warp_springs.view.pictures.camera import Camera
+from warp_springs.view.pictures.directing import put_on_grid
+from warp_springs.view.pictures.rasteriser import Rasteriser
+from warp_springs.view.pictures.scenery import draw_scene
 
 SIZE = (160, 120)
 

@@ -5,8 +5,8 @@ import pytest
 import warp as wp
 
 from warp_springs.kernels import raster, shading
-from warp_springs.view.camera import Camera
-from warp_springs.view.rasteriser import TO_SUN, Drawing, draw
+from warp_springs.view.pictures.camera import Camera
+from warp_springs.view.pictures.rasteriser import TO_SUN, Drawing, draw
 
 SIZE = (160, 120)
 CAMERA = Camera(eye=(0.0, -2.0, 0.0), target=(0.0, 0.0, 0.0), field_of_view=40.0)

@@ -9,7 +9,7 @@ import pytest
 
 import warp_springs as ws
 from tests.chromium import Browser
-from warp_springs.view import exhibits
+from warp_springs.view.pages import exhibits
 
 SCENE = """
 name = "pair"

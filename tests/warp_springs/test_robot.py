@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warp_springs.fields import FIELDS
+from warp_springs.body.fields import FIELDS
 from warp_springs.robot import Robot
 from warp_springs.shapes import cube, lattice, octahedron, tetrahedron, voxels
 

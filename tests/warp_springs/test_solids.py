@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from warp_springs.view.solids import obstacle_mesh
+from warp_springs.view.pictures.solids import obstacle_mesh
 
 BOX = np.array([[-1.0, -0.5, 0.0], [0.5, 0.5, 0.4]])
 

@@ -5,11 +5,11 @@ import warnings
 
 import numpy as np
 import pytest
+import warp_springs.engine.method
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import warp_springs as ws
-import warp_springs.method
 
 INTEGRATORS = ["chin4", "leapfrog", "euler"]
 LIMITS = {"chin4": np.sqrt(12.0), "leapfrog": 2.0, "euler": 2.0}  # of omega dt, springs alone
@@ -107,7 +107,7 @@ def test_bound_is_below_the_limit_and_refusal_above_it(integrator, scene, name, 
     robots = heavier(shapes()[name], scene, integrator)
     born = ws.Simulation(robots, scene, DT, integrator=integrator).run(DT).status
     monkeypatch.setattr(
-        warp_springs.method,
+        warp_springs.engine.method,
         "certainly_unstable",
         lambda strip, dt, integrator: np.zeros(len(strip.ids), bool),
     )

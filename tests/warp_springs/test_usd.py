@@ -16,7 +16,9 @@ from tests.warp_springs.usd_reading import (
     validation_errors,
     world_extent,
 )
-from warp_springs.io import usd_geometry, usd_layout, usd_poses
+from warp_springs.io.usd import geometry as usd_geometry
+from warp_springs.io.usd import layout as usd_layout
+from warp_springs.io.usd import poses as usd_poses
 from warp_springs.view import appearance
 
 FPS = 30
@@ -366,7 +368,7 @@ def test_frames_that_are_not_finite_repeat_the_last_good_one(result, tmp_path):
 
 def test_blocks_of_frames_join_seamlessly(result, tmp_path, monkeypatch):
     whole = ws.export_usd(result, tmp_path / "whole.usda").read_text()
-    monkeypatch.setattr("warp_springs.io.usd._BLOCK_BYTES", 1)
+    monkeypatch.setattr("warp_springs.io.usd.export._BLOCK_BYTES", 1)
     assert ws.export_usd(result, tmp_path / "blocks.usda").read_text() == whole
 
 
@@ -381,7 +383,7 @@ def test_an_export_that_fails_leaves_the_old_file_alone(result, tmp_path, monkey
     def fail(self, *arguments):
         raise RuntimeError("disk on fire")
 
-    monkeypatch.setattr("warp_springs.io.usd_skel.SkelBody.write", fail)
+    monkeypatch.setattr("warp_springs.io.usd.skel.SkelBody.write", fail)
     with pytest.raises(RuntimeError, match="on fire"):
         ws.export_usd(result, path)
     assert path.read_bytes() == before

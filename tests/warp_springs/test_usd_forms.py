@@ -17,7 +17,8 @@ from tests.warp_springs.usd_reading import (
     validation_errors,
     world_points,
 )
-from warp_springs.io import usd_cameras, usd_layout
+from warp_springs.io.usd import cameras as usd_cameras
+from warp_springs.io.usd import layout as usd_layout
 from warp_springs.view import appearance
 
 FPS = 30
@@ -308,7 +309,7 @@ def test_a_calm_way_keeps_a_steady_pace_and_loses_the_bounce():
 
 
 def test_progress_rises_to_one(result, tmp_path, monkeypatch):
-    monkeypatch.setattr("warp_springs.io.usd._BLOCK_BYTES", 1)
+    monkeypatch.setattr("warp_springs.io.usd.export._BLOCK_BYTES", 1)
     seen = []
     ws.export_usd(result, tmp_path / "a.usdc", progress=seen.append)
     assert len(seen) == 2 * len(result.times) + 1

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from warp_springs.fields import FIELDS
+from warp_springs.body.fields import FIELDS
+from warp_springs.body.variants import STACKABLE, Variants
 from warp_springs.robot import Robot
 from warp_springs.shapes import lattice
-from warp_springs.variants import STACKABLE, Variants
 
 N = 6
 BODY = lattice(2, 1, 1).replace(omega=1.0)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_springs import shapes
-from warp_springs.fields import FIELDS
+from warp_springs.body.fields import FIELDS
+from warp_springs.body.variants import Variants
 from warp_springs.robot import Robot
 from warp_springs.scene import Ground, Scene, damping_rate
-from warp_springs.variants import Variants
 
 __all__ = ["ALL_FEATURES", "BODIES", "DT", "FEATURES", "different", "scene_of", "variants"]
 

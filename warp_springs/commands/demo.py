@@ -60,7 +60,7 @@ class DemoCommand:
     def _simulate(self, config, console: Console) -> int:
         from warp_springs.commands.scenes import print_rows, simulated, write_and_say
         from warp_springs.demos.findings import findings
-        from warp_springs.parameters import parameters
+        from warp_springs.view.parameters import parameters
 
         result = simulated(config, console)
         print_rows(console, parameters(config, result), title="parameters")

@@ -44,7 +44,7 @@ class InfoCommand:
 
     def _mesh(self, path: Path) -> list[Row]:
         import warp_springs as ws
-        from warp_springs.parameters import figures
+        from warp_springs.view.parameters import figures
 
         try:
             scale: float | str = float(self.scale)
@@ -81,7 +81,7 @@ def _machine() -> list[Row]:
 
 def _scene(path: Path) -> list[Row]:
     from warp_springs.config import load_scene
-    from warp_springs.parameters import figures
+    from warp_springs.view.parameters import figures
 
     config = load_scene(path)
     robots = config.build_robots()
@@ -99,7 +99,7 @@ def _saved(path: Path) -> list[Row]:
     import warp_springs as ws
     from warp_springs.io.robots import FORMAT
     from warp_springs.io.trees import format_of
-    from warp_springs.parameters import figures, outcome
+    from warp_springs.view.parameters import figures, outcome
 
     if format_of(path) == FORMAT:
         robot = ws.Robot.load(path)

@@ -26,7 +26,7 @@ def watching(
     config: SceneFile, place: tuple[str, int], console: Console
 ) -> Iterator[Callable[[Simulation, float], None]]:
     """Serve a page within; yields what is to be told how far the simulation is."""
-    from warp_springs.view.live import LiveServer
+    from warp_springs.view.pages.live import LiveServer
 
     with LiveServer(f"{config.name} is running", *place) as server:
         console.print(f"[dim]live  [/]{server.url}", highlight=False, soft_wrap=True)
@@ -52,8 +52,8 @@ class _Watcher:
         self._drawing += time.perf_counter() - now
 
     def _show(self, found, done: float) -> None:
-        from warp_springs.view.live import LiveLine
-        from warp_springs.view.page import html_page
+        from warp_springs.view.pages.live import LiveLine
+        from warp_springs.view.pages.player import html_page
 
         config, seconds = self._config, self._config.simulation.duration
         passed = max(time.perf_counter() - self._started, 1e-9)

@@ -32,7 +32,7 @@ class ReportCommand:
         """Load, write, and say what was written."""
         import warp_springs as ws
         from warp_springs.config import load_scene
-        from warp_springs.parameters import parameters
+        from warp_springs.view.parameters import parameters
 
         result = ws.Result.load(self.file)
         scene = self.file.with_suffix(".toml")

@@ -51,7 +51,7 @@ class RunCommand:
         from warp_springs.commands.live import watching
         from warp_springs.commands.scenes import simulated, write_and_say
         from warp_springs.config import SceneFile, load_scene, parse_settings, reference
-        from warp_springs.view.live import LiveServer
+        from warp_springs.view.pages.live import LiveServer
 
         if self.keys:
             print(reference(SceneFile), end="")

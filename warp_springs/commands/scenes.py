@@ -40,8 +40,8 @@ def write_and_say(
     findings: Sequence[tuple[str, str]] = (),
 ) -> list[Path]:
     """Write the files of a run, print what came of it and where everything is."""
-    from warp_springs.outputs import write_outputs
-    from warp_springs.parameters import outcome
+    from warp_springs.view.outputs import write_outputs
+    from warp_springs.view.parameters import outcome
 
     with console.status("writing"):
         paths = write_outputs(config, result, folder, findings)

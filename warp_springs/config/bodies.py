@@ -194,7 +194,7 @@ class MeshConfig(BodyConfig):
 
     def build(self) -> Robot:
         """Read the file, and fill what it holds."""
-        from warp_springs.io.mesh_read import read_mesh
+        from warp_springs.io.mesh.read import read_mesh
 
         common = {"mass": self.mass, "stiffness": self.stiffness}
         body = read_mesh(

@@ -154,8 +154,8 @@ def demonstrate(config: SceneFile, folder: Path, console: Console) -> int:
     import warp_springs as ws
     from warp_springs.config import dump
     from warp_springs.io.outputs import written_beside
-    from warp_springs.outputs import save_figure
-    from warp_springs.parameters import as_markdown, outcome, parameters
+    from warp_springs.view.outputs import save_figure
+    from warp_springs.view.parameters import as_markdown, outcome, parameters
 
     console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
     with console.status("simulating"):
@@ -231,6 +231,6 @@ def _figure(done: list[Trial]) -> Figure:
 
 
 def _energies(done: list[Trial]) -> Figure:
-    from warp_springs.outputs import energy_panels
+    from warp_springs.view.outputs import energy_panels
 
     return energy_panels([(" on ".join(t.pair), t.result, 0) for t in done])

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warp_springs.fields import FIELDS
+from warp_springs.body.fields import FIELDS
 from warp_springs.io.outputs import checked_output, written_beside
 from warp_springs.io.trees import Reader, Writer, check_header
 from warp_springs.robot import Robot

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from warp_springs.body.variants import Variants
 from warp_springs.robot import Robot
-from warp_springs.variants import Variants
 
 __all__ = ["Reader", "Writer", "check_header", "format_of"]
 

@@ -65,7 +65,7 @@ BUNDLE = (
     "near",  # the masses that springs join to each
     "pair_list",  # see kernels.collisions
     "listed",  # [3 M]
-    "contact",  # see warp_springs.colliding
+    "contact",  # see warp_springs.engine.colliding
     "triangles",  # T
     "edges",  # E
     "capacity",  # pairs
@@ -109,7 +109,7 @@ MODEL = {
     "bodies": np.int32,
     "near_rows": np.int32,
     "nears": np.int32,
-    "contacts": REAL,  # warp_springs.colliding.CONTACT
+    "contacts": REAL,  # warp_springs.engine.colliding.CONTACT
     "schedules": REAL,  # factor of the stiffness, and h = k / 2 times what is added to L0
     "reaches2": REAL,  # square of the length that stops a robot, m^2
     "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision

@@ -19,7 +19,7 @@ const int* const near_row = model.near_rows.data + near_row_;
 const int* const near = model.nears.data + near_;
 int* const pair_list = state.pair_lists.data + pair_list_;  // count, room for order, pairs
 scalar* const listed_x = state.listed_positions.data + listed_;
-const scalar* const contact = model.contacts.data + contact_;  // see warp_springs.colliding
+const scalar* const contact = model.contacts.data + contact_;  // see warp_springs.engine.colliding
 const int T = (int)triangles_, E = (int)edges_, CAPACITY = (int)capacity_;
 real collision_energy = zero, rub_power = zero, soft_power = zero;
 

@@ -9,7 +9,7 @@ __all__ = ["PLAIN", "Traits"]
 
 @dataclass(frozen=True)
 class Traits:
-    """Elements of the robots of a group; see ``warp_springs.elements``.
+    """Elements of the robots of a group; see ``warp_springs.body.elements``.
 
     Attributes:
         outer: Pushes or tethers.

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_springs.fields import require_positive
+from warp_springs.body.fields import require_positive
 from warp_springs.robot import Robot
 
 __all__ = ["octahedron", "tetrahedron"]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_springs.fields import require_positive, require_whole
+from warp_springs.body.fields import require_positive, require_whole
 from warp_springs.geometry import FloatArray
 from warp_springs.robot import Robot
 from warp_springs.shapes.points import pairs_within, scattered_points

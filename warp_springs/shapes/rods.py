@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warp_springs.fields import require_positive, require_whole
+from warp_springs.body.fields import require_positive, require_whole
 from warp_springs.robot import Robot
 from warp_springs.shapes.voxels import lattice
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warp_springs.fields import require_positive, require_whole
+from warp_springs.body.fields import require_positive, require_whole
 from warp_springs.geometry import FloatArray, IntArray, spring_lengths
 from warp_springs.robot import Robot
 from warp_springs.shapes.points import pairs_within, scattered_points

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warp_springs.fields import require_positive
+from warp_springs.body.fields import require_positive
 from warp_springs.robot import Robot
 
 __all__ = ["cube", "lattice", "voxels"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from warp_springs.checks import check_choice, check_number
 from warp_springs.materials import linear_rgb
 from warp_springs.view import appearance
-from warp_springs.view.camera import Camera
+from warp_springs.view.pictures.camera import Camera
 
 COLORS = ("stress", "material", "actuation", "plain")
 """What the colour of a bar may say."""

@@ -1,0 +1,206 @@
+"""Evaluation: a whole generation in one simulation, and the second look at champions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from evolve.config import RunConfig
+from evolve.fitness import FITNESS, SAMPLES_PER_CYCLE, Trial
+from evolve.judging.scores import Scores
+from evolve.judging.second_look import SecondLook, quantile, share
+from evolve.judging.trials import aggregate, perturbed, scattered
+from evolve.streams import Role, Streams
+
+if TYPE_CHECKING:
+    import warp_springs as ws
+
+__all__ = ["Evaluator"]
+
+
+class Evaluator:
+    """Runs the trial of a configuration: robots settle, then they are measured.
+
+    A robot's scores do not depend on which robots it is evaluated with, nor on the number of
+    threads.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        self.task = config.task
+        self.descriptors = config.descriptors
+        """Names of what is measured beside the fitness."""
+        self.simulation = config.simulation
+        self.scene = config.scene.build()
+        self.streams = Streams(config.seed)
+        self.period = config.encoding.period
+        """Time of a cycle of the muscles [s]."""
+        self.settle = config.task.settle * self.period
+        """Settling time [s]."""
+        self.measure = config.task.measure * self.period
+        """Time of the measurement [s]."""
+
+    def __call__(self, robots: Sequence[ws.Robot]) -> Scores:
+        """Simulate the robots, all at once, and score them."""
+        started = time.perf_counter()
+        if self.task.trials.count == 1:
+            scores = self._score(robots, robots, self.scene)
+        else:
+            scores = self._mean(list(self._several(robots)))
+        return replace(scores, wall_time=time.perf_counter() - started)
+
+    def _several(self, robots: Sequence[ws.Robot]) -> Iterator[Scores]:
+        """Scores of each of the trials: a floor of its own, starts of their own."""
+        settings = self.task.trials
+        starts = scattered(robots, settings, self.streams, settings.count)
+        spread = np.linspace(-settings.friction, settings.friction, settings.count)
+        for start, change in zip(starts, spread, strict=True):
+            yield self._score(start, robots, _rougher(self.scene, 1.0 + float(change)))
+
+    def _mean(self, trials: Sequence[Scores]) -> Scores:
+        """One score for each robot from those of its trials."""
+        status = np.stack([trial.status for trial in trials])
+        first = np.argmax(status != 0, axis=0)
+        return Scores(
+            fitness=aggregate(
+                np.stack([trial.fitness for trial in trials]), self.task.trials.aggregate
+            ),
+            status=np.take_along_axis(status, first[None], axis=0)[0],
+            descriptors={
+                name: np.mean([trial.descriptors[name] for trial in trials], axis=0)
+                for name in self.descriptors
+            },
+            spring_evaluations=np.sum([trial.spring_evaluations for trial in trials], axis=0),
+        )
+
+    def _score(
+        self, starts: Sequence[ws.Robot], robots: Sequence[ws.Robot], scene: ws.Scene
+    ) -> Scores:
+        """Scores of one trial of robots that begin it as `starts`."""
+        simulation = self._simulate(starts, scene=scene)
+        # Measures look at a robot as it was built, not as it was bent for the start.
+        trial = self._trial(simulation, robots)
+        status = np.asarray(trial.measured.status, dtype=np.int64)
+        found = {name: FITNESS[name](trial) for name in self.descriptors}
+        return Scores(
+            fitness=FITNESS[self.task.fitness](trial),
+            status=status,
+            descriptors={k: np.where(status == 0, v, np.nan) for k, v in found.items()},
+            spring_evaluations=_costs(trial, simulation.robot_dt),
+        )
+
+    def prepare(self, robots: Sequence[ws.Robot]) -> None:
+        """Load the kernels for such robots: a new machine compiles them first."""
+        self._simulate(robots)
+
+    def second_look(self, robots: Sequence[ws.Robot], fitness: np.ndarray) -> SecondLook:
+        """Repeat the trial at half the time step in float64, and from perturbed starts.
+
+        Each robot takes half its own step; robots of the same step run in one simulation. The
+        perturbed trials of all robots run in another, as the first trial ran but for the starts.
+
+        Args:
+            robots: n robots.
+            fitness: Their fitness at the first look, shape (n,).
+        """
+        settings = self.task.second_look
+        dt = 0.5 * self._simulate(robots).robot_dt
+        halved = np.full(len(robots), np.nan)
+        for step in np.unique(dt):
+            alike = np.flatnonzero(dt == step)
+            again = self._simulate([robots[i] for i in alike], float(step), "float64")
+            halved[alike] = self._fitness(self._trial(again))
+        starts = [
+            start
+            for robot in robots
+            for start in perturbed(robot, settings, self.streams, Role.SECOND_LOOK, settings.trials)
+        ]
+        # The fitness measures a robot as it was built, not as it was bent for the start.
+        built = [robot for robot in robots for _ in range(settings.trials)]
+        trials = self._fitness(self._trial(self._simulate(starts), built))
+        usual = quantile(trials.reshape(len(robots), settings.trials), settings.quantile)
+        kept = share(halved, fitness), share(usual, fitness)
+        survives = (kept[0] >= settings.threshold) & (kept[1] >= settings.threshold)
+        return SecondLook(dt, halved, kept[0], usual, kept[1], survives)
+
+    def film(
+        self,
+        robots: Sequence[ws.Robot],
+        fps: float = 30.0,
+        least_cycles: float = 0.0,
+        energy: bool = False,
+        progress: Callable[[float], None] | None = None,
+    ) -> ws.Result:
+        """Simulate a whole trial, or more cycles if asked, and record all frames of all robots."""
+        duration = max(self.settle + self.measure, least_cycles * self.period)
+        return self._simulate(robots).run(duration, fps=fps, energy=energy, progress=progress)
+
+    def _fitness(self, trial: Trial) -> np.ndarray:
+        """Fitness of every robot, shape (N,); NaN for those who were stopped."""
+        stopped = np.asarray(trial.measured.status) != 0
+        return np.where(stopped, np.nan, FITNESS[self.task.fitness](trial))
+
+    def _trial(self, simulation: ws.Simulation, robots: Sequence[ws.Robot] | None = None) -> Trial:
+        """Run a trial; `robots` is whom to measure if not who was simulated."""
+        used = [FITNESS[name] for name in (self.task.fitness, *self.descriptors)]
+        energy = any(measure.needs_energy for measure in used)
+        count = 1
+        if any(measure.needs_path for measure in used):
+            count = max(2, round(SAMPLES_PER_CYCLE * self.task.measure))
+        settled = simulation.run(self.settle)
+        # Each piece ends at the step next to where it should, so that no error adds up.
+        ends = self.settle + self.measure * np.arange(1, count + 1) / count
+        pieces = [simulation.run(end - simulation.time, energy=energy) for end in ends]
+        direction = np.array(self.task.direction) / np.hypot(*self.task.direction)
+        return Trial(
+            simulation.robots if robots is None else robots, settled, pieces, tuple(direction)
+        )
+
+    def _simulate(
+        self,
+        robots: Sequence[ws.Robot],
+        dt: float | None = None,
+        precision: str | None = None,
+        scene: ws.Scene | None = None,
+    ) -> ws.Simulation:
+        """Pack robots, with the step, precision and scene of the configuration unless told."""
+        import warp_springs as ws
+
+        settings = self.simulation
+        return ws.Simulation(
+            robots,
+            self.scene if scene is None else scene,
+            dt=settings.dt if dt is None else dt,
+            precision=settings.precision if precision is None else precision,
+            integrator=settings.integrator,
+            device=settings.device,
+            layout=settings.layout,
+            threads=settings.threads,
+        )
+
+
+def _rougher(scene: ws.Scene, factor: float) -> ws.Scene:
+    """The scene with so many times the friction."""
+    ground = scene.ground
+    if ground is None or factor == 1.0:
+        return scene
+    coefficients = {
+        name: factor * getattr(ground, name) for name in ("static_friction", "kinetic_friction")
+    }
+    return replace(scene, ground=replace(ground, **coefficients))
+
+
+def _costs(trial: Trial, dt: np.ndarray) -> np.ndarray:
+    """Spring evaluations of every robot, shape (N,): the total, shared out by springs x steps."""
+    import warp_springs as ws
+
+    robots, end = trial.robots, trial.measured.end_time
+    fixed = isinstance(robots, ws.Variants)
+    springs = robots.body.n_springs if fixed else [robot.n_springs for robot in robots]
+    times = np.where(np.asarray(trial.measured.status) == 0, end, trial.measured.status_time)
+    weights = np.asarray(springs) * times / dt
+    total = sum(result.spring_evaluations for result in (trial.settled, *trial.pieces))
+    return np.rint(total * (weights / max(weights.sum(), 1e-300))).astype(np.int64)

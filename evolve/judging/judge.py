@@ -1,0 +1,99 @@
+"""Judging genomes: who simulates them, and that nobody is simulated twice."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from evolve.encodings.base import Encoding, Genomes
+from evolve.judging.scores import Scores
+
+if TYPE_CHECKING:
+    from evolve.config import RunConfig
+
+__all__ = ["Here", "Judge", "Simulator", "Ticket"]
+
+
+Ticket = Callable[[], Scores]
+"""Waits for the scores of what was submitted, and returns them; may be called more than once."""
+
+
+class Simulator(Protocol):
+    """Whoever simulates genomes: this process, other processes, other machines."""
+
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """Begin to simulate n genomes, given both as such and as their bytes."""
+
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
+        """Load the kernels for such genomes, everywhere."""
+
+    def close(self) -> None:
+        """End whatever was started."""
+
+
+class Here:
+    """Simulates genomes in this process, when the scores are waited for."""
+
+    def __init__(self, config: RunConfig, encoding: Encoding) -> None:
+        from evolve.judging.evaluate import Evaluator
+
+        self._evaluator, self._encoding = Evaluator(config), encoding
+
+    def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
+        """The scores are computed the first time that somebody waits for them."""
+        return cache(lambda: self._evaluator(self._encoding.express(genomes)))
+
+    def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
+        """Load the kernels for such genomes."""
+        self._evaluator.prepare(self._encoding.express(genomes))
+
+    def close(self) -> None:
+        """Nothing was started."""
+
+
+class Judge:
+    """What is known of the genomes of a run.
+
+    A trial follows from the genome alone, so a genome that was judged before, in this generation
+    or an earlier one, has the same scores again, at no cost.
+    """
+
+    def __init__(self) -> None:
+        self._places: dict[bytes, tuple[int, int]] = {}
+        self._parts: list[Scores] = []
+
+    def unknown(self, blobs: Sequence[bytes]) -> np.ndarray:
+        """Which of some genomes, given by their bytes, must be simulated: their indices."""
+        first: dict[bytes, int] = {}
+        for index, key in enumerate(map(_key, blobs)):
+            if key not in self._places:
+                first.setdefault(key, index)
+        return np.array(list(first.values()), np.intp)
+
+    def learn(self, blobs: Sequence[bytes], scores: Scores) -> None:
+        """Take in scores of genomes; of what is known already the first scores stay."""
+        part = len(self._parts)
+        self._parts.append(scores)
+        for row, key in enumerate(map(_key, blobs)):
+            self._places.setdefault(key, (part, row))
+
+    def recall(self, blobs: Sequence[bytes], simulated: np.ndarray) -> Scores:
+        """Scores of known genomes; all but those at the indices `simulated` cost nothing now."""
+        part, row = np.array([self._places[_key(blob)] for blob in blobs]).T
+        order = np.argsort(part, kind="stable")
+        pieces = [
+            self._parts[p].take(row[order[part[order] == p]]) for p in np.unique(part).tolist()
+        ]
+        scores = Scores.concatenate(pieces).take(np.argsort(order, kind="stable"))
+        cost = np.zeros_like(scores.spring_evaluations)
+        cost[simulated] = scores.spring_evaluations[simulated]
+        return replace(scores, spring_evaluations=cost)
+
+
+def _key(blob: bytes) -> bytes:
+    return hashlib.blake2b(blob, digest_size=16).digest()

@@ -1,0 +1,388 @@
+"""Crowds: robots that gather their springs, as slices that a run steps and looks at.
+
+A crowd is made of consecutive bundles of width one that take the same step. How it is stepped is
+its layout: ``Threads`` (flat, on a CPU), ``Launches`` (flat, on a GPU) or ``Blocks``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import itertools
+import os
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, replace
+
+import numpy as np
+import warp as wp
+
+from warp_springs.batch import Batch, Group
+from warp_springs.engine.gathering import Bodies, Lists, arrays
+from warp_springs.engine.layouts import block_size
+from warp_springs.engine.packing import aligned
+from warp_springs.kernels.block import BLOCK, block
+from warp_springs.kernels.buffers import BUNDLE, SEEN, real_dtype, structs
+from warp_springs.kernels.bundle import CHECK_EVERY
+from warp_springs.kernels.flat import launches, threads
+from warp_springs.kernels.gather import (
+    CHUNK,
+    LOOKS,
+    GatherFeatures,
+    gather_structs,
+    run_type,
+    slice_width,
+)
+from warp_springs.kernels.law import CONSTANTS
+from warp_springs.kernels.look import look
+
+__all__ = ["Blocks", "Crowd", "Launches", "Threads", "crowds"]
+
+#: Threads have this many slices each, or they would wait more than they work.
+SLICES_PER_THREAD = 16
+
+
+def crowds(
+    group: Group, batch: Batch, buffers: Mapping[str, np.ndarray], device: wp.Device, cores: int
+) -> Iterator[Crowd]:
+    """The crowds of a group."""
+    table = batch.bundles[group.first : group.first + group.count]
+    kinds = [BUNDLE.index(name) for name in ("level", "substeps", "masses")]
+    level, substeps, masses = table[:, kinds].T
+    alike = np.stack([level, substeps, 0 * level])
+    kind = kind_of(group.layout, device)
+    if kind is Blocks:
+        alike[2] = [block_size(group.features.precision, m) for m in masses.tolist()]
+    elif kind is Threads:
+        alike[2] = np.arange(len(level))  # one body after the other, each by all threads
+    edges = np.flatnonzero((np.diff(alike, axis=1) != 0).any(axis=0)) + 1
+    edges = [0, *edges.tolist(), group.count]
+    for first, last in itertools.pairwise(edges):
+        yield kind(group, group.first + first, group.first + last, batch, buffers, device, cores)
+
+
+def kind_of(layout: str, device: wp.Device) -> type[Crowd]:
+    """How a layout is carried out on a device."""
+    if layout == "block":
+        return Blocks
+    return Threads if device.is_cpu else Launches
+
+
+class Crowd:
+    """Bundles ``first`` to ``last - 1``, with arrays of their own on the device.
+
+    Attributes:
+        work: Spring evaluations of one step.
+        launch_work: Spring evaluations of one launch, so that Ctrl-C is answered.
+        gang: Whether it needs all threads for itself.
+    """
+
+    layout: str
+    launch_work = 1e8
+    gang = True
+
+    def __init__(self, group, first, last, batch, buffers, device, cores) -> None:
+        self.first, self.last, self.buffers, self.device = first, last, buffers, device
+        rows = batch.bundles[first:last]
+        about = dict(zip(BUNDLE, rows[0], strict=True))
+        self._division = int(about["division"])
+        names = [field.name for field in fields(group.features) if field.name != "width"]
+        lanes = {name: getattr(group.features, name) for name in names}
+        width = slice_width(self.layout, group.features.precision)
+        self.features = GatherFeatures(width=width, layout=self.layout, **lanes)
+        self._lists = Lists.of(
+            bodies := Bodies.of(rows, buffers), self.features, along_curve=group.layout == "flat"
+        )
+        self._robots, self._slots = last - first, len(self._lists.home)
+        springs, masses = rows[:, BUNDLE.index("springs")], rows[:, BUNDLE.index("masses")]
+        self.work = int((springs + 2 * masses).sum()) * self._division
+        self._given = {
+            "slots": self._slots,
+            "robots": self._robots,
+            "run": self._run(batch, about),
+            **self._structs(arrays(bodies, self._lists, self.features)),
+        }
+        self._seen_in = {
+            name: slice(*self._range(rows, name, len(buffers[name]), len(buffers["omegas"])))
+            for name in SEEN
+        }
+        self._given |= self._looking()
+        self._wanted: dict[int, wp.array] = {}
+        self._kernels: dict[bool, object] = {}
+        self._cores = cores
+        self._make()
+
+    # What a layout does in its own way.
+
+    def _make(self) -> None:
+        """Make what does not depend on the ledger."""
+
+    def _record(self, features: GatherFeatures) -> object:
+        """Record the launches of a step, or of all steps."""
+        raise NotImplementedError
+
+    def _go(self, recorded: object, first: int, last: int) -> None:
+        """Make the crowd's own steps ``first`` to ``last - 1``."""
+        raise NotImplementedError
+
+    def _side(self, step: int) -> int:
+        """Buffer that holds the positions at the crowd's own step."""
+        return step & 1
+
+    # What all do.
+
+    def prepare(self, ledger: bool) -> None:
+        """Use the kernels with or without the energy ledger from now on, and open it anew."""
+        if ledger not in self._kernels:
+            features = replace(self.features, ledger=ledger)
+            kernels, over = look(features)
+            sizes = self._sizes(features)
+            looks = [self._recorded(k, sizes[name]) for k, name in zip(kernels, over, strict=True)]
+            self._kernels[ledger] = self._record(features), looks
+        self._advance, self._look = self._kernels[ledger]
+        for name in ("ledgers", "good_ledgers"):
+            getattr(self._given["state"], name).zero_()
+
+    def _sizes(self, features: GatherFeatures) -> dict[str, int]:
+        """What a kernel may be launched over."""
+        return {
+            "slots": self._slots,
+            "sites": self._slots // (features.width if features.vector else 1),
+            "chunks": len(self._given["model"].chunks) // len(CHUNK),
+            "robots": self._robots,
+        }
+
+    def advance(self, first_step: int, last_step: int) -> None:
+        """Step all robots from ``first_step`` to ``last_step`` of the run."""
+        self._go(self._advance, first_step * self._division, last_step * self._division)
+
+    def observe(self, step: int, which: wp.array | None = None) -> None:
+        """Write what is seen of some bundles (default all) at ``step``; changes no state."""
+        if which is not None and len(which) == 0:
+            return
+        own = step * self._division
+        for launch in self._look:
+            launch.set_param_by_name("side", self._side(own))
+            launch.set_param_by_name("step", own)
+            launch.set_param_by_name("wanted", self._chosen(which))
+            launch.launch()
+        if not self.device.is_cpu:
+            for name, here in self._seen_in.items():
+                self.buffers[name][here] = getattr(self._given["seen"], name).numpy()
+
+    def _chosen(self, which: wp.array | None) -> wp.array:
+        """For each robot whether it is looked at."""
+        key = 0 if which is None else which.ptr
+        if key not in self._wanted:
+            wanted = np.ones(self._robots, np.int32)
+            if which is not None:
+                wanted[:] = 0
+                wanted[which.numpy() - self.first] = 1
+                self._wanted = {k: v for k, v in self._wanted.items() if k == 0}
+            self._wanted[key] = self._array(wanted)
+        return self._wanted[key]
+
+    def _run(self, batch: Batch, about: dict[str, int]):
+        """The constants of the steps."""
+        constants = self.buffers["constants"].reshape(-1, len(CONSTANTS))[about["level"]]
+        run = run_type(self.features.precision)()
+        for name, value in zip(CONSTANTS, constants.tolist(), strict=True):
+            setattr(run, name, value)
+        run.exact_dt, run.substeps = constants[0], int(about["substeps"])
+        return run
+
+    def _structs(self, packed: dict[str, np.ndarray]) -> dict[str, object]:
+        """The structs of arrays, filled."""
+        filled = {}
+        structs_of = zip(("model", "state"), gather_structs(self.features.precision), strict=True)
+        for label, struct in structs_of:
+            filled[label] = struct()
+            for name, field in struct.vars.items():
+                values = (
+                    packed.get(name, np.zeros(0))
+                    .astype(wp.dtype_to_numpy(field.type.dtype))
+                    .ravel()
+                )
+                setattr(filled[label], name, self._array(aligned([values], values.dtype)))
+        return filled
+
+    @staticmethod
+    def _range(rows: np.ndarray, name: str, size: int, lanes: int) -> tuple[int, int]:
+        """Where the robots of the crowd are in a buffer of what is seen."""
+        column = {c: rows[:, i] for i, c in enumerate(BUNDLE)}
+        if name in ("seen_positions", "seen_velocities"):
+            return int(column["state"].min()), int((column["state"] + 3 * column["masses"]).max())
+        columns = size // lanes
+        return columns * int(column["lane"].min()), columns * (int(column["lane"].max()) + 1)
+
+    def _looking(self) -> dict[str, object]:
+        """What a look writes: on a CPU into the buffers themselves."""
+        precision = self.features.precision
+        seen = structs(precision).seen()
+        for name, here in self._seen_in.items():
+            setattr(seen, name, self._array(self.buffers[name][here]))
+        chunks = len(self._given["model"].chunks) // len(CHUNK)
+        return {
+            "seen": seen,
+            "shown": self._array(aligned([np.zeros(4 * self._slots)], real_dtype(precision))),
+            "parts": wp.zeros(LOOKS * self._slots, dtype=wp.float64, device=self.device),
+            "sums": wp.zeros(LOOKS * chunks, dtype=wp.float64, device=self.device),
+        }
+
+    def _array(self, values: np.ndarray) -> wp.array:
+        """The array on the device; on a CPU the very same memory."""
+        dtype = wp.dtype_from_numpy(values.dtype)
+        return wp.array(values, dtype=dtype, device=self.device, copy=not self.device.is_cpu)
+
+    def _recorded(self, kernel: wp.Kernel, dim, block_dim: int | None = None) -> wp.Launch:
+        """A launch with the arguments that do not change."""
+        inputs = [self._given.get(argument.label, 0) for argument in kernel.adj.args]
+        inputs = [
+            wp.zeros(1, dtype=argument.type.dtype, device=self.device)
+            if isinstance(argument.type, wp.array) and value == 0
+            else value
+            for argument, value in zip(kernel.adj.args, inputs, strict=True)
+        ]
+        return wp.launch(
+            kernel, dim, inputs=inputs, device=self.device, record_cmd=True, block_dim=block_dim
+        )
+
+
+class Threads(Crowd):
+    """One body that several CPU threads step together."""
+
+    layout = "threads"
+
+    def _make(self) -> None:
+        slices = self._lists.sites[:, 3]
+        count = max(1, min(self._cores, len(slices) // SLICES_PER_THREAD))
+        load = np.cumsum(slices + 4)  # moving a mass costs about as much as four springs
+        edges = np.searchsorted(load, np.arange(1, count) * (load[-1] / count)) + 1
+        self._count = count
+        self._given |= {
+            "edges": self._array(np.array([0, *edges, len(slices)], np.int32)),
+            "gates": self._array(aligned([np.zeros(64, np.int32)], np.dtype(np.int32))),
+            "give_way": _give_way(),
+            "threads": count,
+        }
+        self._pool = ThreadPoolExecutor(count)
+
+    def _record(self, features: GatherFeatures) -> list[wp.Launch]:
+        recorded = []
+        for thread in range(self._count):
+            self._given["thread"] = thread
+            recorded.append(self._recorded(threads(features), 1))
+        return recorded
+
+    def _go(self, recorded: list[wp.Launch], first: int, last: int) -> None:
+        for launch in recorded:
+            launch.set_param_by_name("first_step", first)
+            launch.set_param_by_name("last_step", last)
+        others = [self._pool.submit(launch.launch) for launch in recorded[1:]]
+        recorded[0].launch()
+        for other in others:
+            other.result()
+
+
+class Launches(Crowd):
+    """Bodies of any number on a GPU, a pass a launch; on a CPU too, one thread, to verify."""
+
+    layout = "launches"
+    launch_work = 1e10
+    gang = False
+
+    def _make(self) -> None:
+        self._clock = self._array(np.zeros(1, np.int64))
+        self._given["clock"] = self._clock
+        self._graphs: dict[int, wp.Graph] = {}
+
+    def _record(self, features: GatherFeatures) -> tuple[list, list, wp.Launch]:
+        kernels = launches(features)
+        sizes = self._sizes(features)
+        return (
+            [self._recorded(kernel, self._slots) for kernel in kernels.steps],
+            [self._recorded(kernel, sizes[over]) for kernel, over in kernels.check],
+            self._recorded(kernels.tick, 1),
+        )
+
+    def _go(self, recorded, first: int, last: int) -> None:
+        self._clock.fill_(first)
+        while first < last:
+            until = min(last, (first // CHECK_EVERY + 1) * CHECK_EVERY)
+            if self.device.is_cuda and until - first == CHECK_EVERY:
+                wp.capture_launch(self._graph(recorded))
+            else:
+                self._issue(recorded, first, until)
+            first = until
+
+    def _issue(self, recorded, first: int, last: int) -> None:
+        """The launches of some steps, one after the other, and of the clock."""
+        steps, check, tick = recorded
+        for step in range(first, last):
+            for launch in (check if step % CHECK_EVERY == 0 else []) + steps:
+                launch.set_param_by_name("offset", step - first)
+                launch.launch()
+        tick.set_param_by_name("steps", last - first)
+        tick.launch()
+
+    def _graph(self, recorded) -> wp.Graph:
+        """The steps from one check to the next, captured."""
+        key = id(recorded)
+        if key not in self._graphs:
+            with wp.ScopedCapture(self.device) as capture:
+                self._issue(recorded, 0, CHECK_EVERY)
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
+
+
+class Blocks(Crowd):
+    """Robots that fit a block, several small ones to each."""
+
+    layout = "block"
+
+    def _make(self) -> None:
+        self._size = block_size(self.features.precision, int(self._lists.slots.max()))
+        # Blocks on a CPU share their memory of a block: one launch at a time.
+        self.gang = self.device.is_cpu
+        self.launch_work = 2e6 if self.device.is_cpu else 1e10
+        self._table = _blocks(self._lists.slots, self._lists.first, self._size, self.features.width)
+        self._given["blocks"] = self._array(self._table.ravel())
+
+    def _side(self, step: int) -> int:
+        return 0
+
+    def _record(self, features: GatherFeatures) -> wp.Launch:
+        before = wp.config.enable_cpu_blocks
+        wp.config.enable_cpu_blocks = True  # asked for while a launch is made, not later
+        try:
+            dim = (len(self._table), self._size)
+            return self._recorded(block(features, self._size), dim, self._size)
+        finally:
+            wp.config.enable_cpu_blocks = before
+
+    def _go(self, recorded: wp.Launch, first: int, last: int) -> None:
+        recorded.set_param_by_name("first_step", first)
+        recorded.set_param_by_name("last_step", last)
+        recorded.launch()
+
+
+def _blocks(slots: np.ndarray, first: np.ndarray, size: int, width: int) -> np.ndarray:
+    """The table of blocks: consecutive robots, as many as fit."""
+    blocks: list[list[int]] = []
+    for robot, (count, start) in enumerate(zip(slots.tolist(), first.tolist(), strict=True)):
+        if not blocks or (blocks[-1][1] * width + count > size):
+            blocks.append([start // width, 0, robot, 0])
+        blocks[-1][1] += count // width
+        blocks[-1][3] += 1
+    return np.array(blocks, np.int32).reshape(-1, len(BLOCK))
+
+
+@functools.cache
+def _give_way() -> int:
+    """Address of the system's function that lets another thread run, 0 if there is none."""
+    try:
+        library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
+        function = library.SwitchToThread if os.name == "nt" else library.sched_yield
+        return ctypes.cast(function, ctypes.c_void_p).value or 0
+    except (AttributeError, OSError):
+        return 0

@@ -1,0 +1,255 @@
+"""Slices of a batch: what one thread steps at a time, and what it records on the way."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import warp as wp
+
+from warp_springs.batch import Batch, Group, Slots
+from warp_springs.engine.crowd import Crowd, crowds
+from warp_springs.engine.packing import aligned
+from warp_springs.kernels.buffers import BUNDLE, ENERGIES, real_dtype, structs
+from warp_springs.kernels.lanes import kernels, scratch_size
+
+__all__ = ["Slice", "Tape", "cut", "run_all"]
+
+#: Slices a thread, so that a thread that is done early takes over work of another.
+SLICES_PER_THREAD = 4
+#: Spring evaluations of one launch: about a fifth of a second, so that Ctrl-C is answered.
+LAUNCH_WORK = 1e8
+#: Values between the scratch blocks of two slices: threads then never share a cache line.
+SCRATCH_GAP = 256
+
+
+def cut(
+    batch: Batch, buffers: Mapping[str, np.ndarray], threads: int, device: wp.Device
+) -> list[Slice | Crowd]:
+    """Cut the groups of a batch into slices of about equal work, or into crowds."""
+    springs, masses, division = (
+        batch.bundles[:, BUNDLE.index(name)] for name in ("springs", "masses", "division")
+    )
+    work = (springs + 2 * masses) * division
+    pieces = SLICES_PER_THREAD * threads if threads > 1 else 1
+    target = work.sum() / pieces
+    slices, filled = [], {}
+    for group in batch.groups:
+        if group.layout != "lanes":
+            slices += crowds(group, batch, buffers, device, threads)
+            continue
+        here = np.s_[group.first : group.first + group.count]
+        total = np.cumsum(work[here])
+        inner = np.searchsorted(total, np.arange(target, total[-1], target)) + 1
+        edges = np.unique([0, *inner[inner < group.count], group.count]) + group.first
+        for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            load = int(work[first:last].sum()) * group.features.width
+            largest = (int(masses[first:last].max()), int(springs[first:last].max()))
+            if not filled:
+                kinds = structs(group.features.precision)
+                filled = {kind.key.lower(): _filled(kind, buffers) for kind in kinds}
+            slices.append(Slice(group, first, last, load, largest, buffers, filled))
+    return slices
+
+
+class Slice:
+    """Bundles ``first`` to ``last - 1`` of one group, with scratch memory of their own.
+
+    Launches are recorded when the slice is made, on one thread, which also loads the modules
+    (loading is not safe on several); threads only launch them.
+    """
+
+    launch_work, gang = LAUNCH_WORK, False
+
+    def __init__(
+        self,
+        group: Group,
+        first: int,
+        last: int,
+        work: int,
+        largest: tuple[int, int],
+        buffers: Mapping[str, np.ndarray],
+        filled: Mapping[str, object],
+    ) -> None:
+        self.first, self.last, self.work = first, last, work
+        self.buffers = buffers
+        self._features = group.features
+        real = real_dtype(group.features.precision)
+        size = scratch_size(group.features, *largest) + SCRATCH_GAP
+        given = {
+            "scratch": _on_device(aligned([np.zeros(size, real)], real)),
+            "which": _on_device(np.arange(first, last, dtype=np.int32)),
+            "first_bundle": first,
+        }
+        self._given = given | filled
+        self._everything = given["which"]
+        self._launches: dict[bool, tuple[wp.Launch, wp.Launch]] = {}
+        self.prepare(ledger=False)
+
+    def prepare(self, ledger: bool) -> None:
+        """Use the kernels with or without the energy ledger from now on."""
+        if ledger not in self._launches:
+            advance, observe = kernels(replace(self._features, ledger=ledger))
+            count = self.last - self.first
+            self._launches[ledger] = (
+                _recorded(advance, count, self._given),
+                _recorded(observe, count, self._given),
+            )
+        self._advance, self._observe = self._launches[ledger]
+
+    def advance(self, first_step: int, last_step: int) -> None:
+        """Step all bundles from ``first_step`` to ``last_step``."""
+        self._advance.set_param_by_name("first_step", first_step)
+        self._advance.set_param_by_name("last_step", last_step)
+        self._advance.launch()
+
+    def observe(self, step: int, which: wp.array | None = None) -> None:
+        """Write what is seen of some bundles (default all) at ``step``; changes no state."""
+        which = self._everything if which is None else which
+        if len(which):
+            self._observe.set_dim(len(which))
+            self._observe.set_param_by_name("which", which)
+            self._observe.set_param_by_name("step", step)
+            self._observe.launch()
+
+
+@dataclass
+class Tape:
+    """What one slice records in one run, and how far it has come.
+
+    Attributes:
+        members: Robots of the slice, shape (n,).
+        recorded: Those whose frames are kept.
+        frames: Their positions [m], flat, shape (F, 3 * sum of M).
+        energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
+        done: Steps done so far.
+        taken: Frames taken so far.
+    """
+
+    slice: Slice | Crowd
+    slots: Slots
+    recorded: np.ndarray
+    frame_steps: Sequence[int]
+    energy: bool
+    done: int = 0
+    taken: int = 0
+    members: np.ndarray = field(init=False)
+    frames: np.ndarray = field(init=False)
+    energies: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        def inside(robots: np.ndarray) -> np.ndarray:
+            bundle = self.slots.bundle[robots]
+            return robots[(bundle >= self.slice.first) & (bundle < self.slice.last)]
+
+        count = len(self.frame_steps)
+        self.members = inside(np.arange(len(self.slots.bundle)))
+        self.recorded = inside(self.recorded)
+        self._state = self.slots.state_indices(self.recorded)
+        self.frames = np.empty((count, len(self._state)))
+        self._lanes = self.slots.lane_indices(self.members, ENERGIES)
+        self.energies = np.empty((count if self.energy else 0, len(self.members), ENERGIES))
+        bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
+        self._which = None if self.energy else _on_device(bundles)
+
+    def run(self, first: int, last: int, stop: threading.Event) -> None:
+        """Step the slice from ``first`` to ``last``, with the frames between."""
+        at = first
+        frames = self.frame_steps if self.energy or len(self.recorded) else ()
+        for index, step in enumerate(frames):
+            at = self._advance(first, at, step, stop)
+            self.slice.observe(step, self._which)
+            self._take(index)
+            self.taken = index + 1
+        at = self._advance(first, at, last, stop)
+        if not stop.is_set():
+            self.slice.observe(last)
+
+    def _advance(self, first: int, at: int, target: int, stop: threading.Event) -> int:
+        steps = max(1, int(self.slice.launch_work / max(self.slice.work, 1)))
+        while at < target and not stop.is_set():
+            until = min(at + steps, target)
+            self.slice.advance(at, until)
+            at = until
+            self.done = at - first
+        return at
+
+    def _take(self, index: int) -> None:
+        buffers = self.slice.buffers
+        if len(self._state):
+            self.frames[index] = buffers["seen_positions"][self._state]
+        if self.energy:
+            self.energies[index] = buffers["seen_energies"][self._lanes]
+
+    def cut_to(self, frames: int) -> Tape:
+        """A tape of the first frames alone; they are complete once they are ``taken``."""
+        short = copy.copy(self)
+        short.frame_steps = self.frame_steps[:frames]
+        short.frames, short.energies = self.frames[:frames], self.energies[:frames].copy()
+        return short
+
+    def frames_by_robot(self) -> dict[int, np.ndarray]:
+        """Frames (F, M, 3) of each recorded robot."""
+        sizes = 3 * self.slots.masses[self.recorded]
+        parts = np.split(self.frames, np.cumsum(sizes)[:-1], axis=1) if len(sizes) else []
+        shape = (len(self.frame_steps), -1, 3)
+        return {
+            int(robot): np.ascontiguousarray(part).reshape(shape)
+            for robot, part in zip(self.recorded, parts, strict=True)
+        }
+
+
+def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress=None) -> None:
+    """Run all tapes on a pool of threads; the largest first, so that little is left at the end.
+
+    Those that need all threads for themselves come before, one after the other.
+
+    ``progress`` is called with the fraction done. On an exception, Ctrl-C included, the threads
+    stop after their present launch.
+    """
+    stop = threading.Event()
+    tapes = sorted(tapes, key=lambda tape: -tape.slice.work)
+    total = (last - first) * sum(tape.slice.work for tape in tapes)
+    with ThreadPoolExecutor(min(threads, len(tapes))) as pool:
+        try:
+            for turn in _turns(tapes):
+                pending = {pool.submit(tape.run, first, last, stop) for tape in turn}
+                while pending:
+                    done, pending = wait(pending, timeout=0.1)
+                    for future in done:
+                        future.result()
+                    if progress is not None and total:
+                        progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
+        except BaseException:
+            stop.set()
+            raise
+
+
+def _turns(tapes: Sequence[Tape]) -> list[list[Tape]]:
+    """Tapes that run at the same time."""
+    others = [tape for tape in tapes if not tape.slice.gang]
+    return [[tape] for tape in tapes if tape.slice.gang] + ([others] if others else [])
+
+
+def _recorded(kernel: wp.Kernel, dim: int, given: Mapping[str, object]) -> wp.Launch:
+    """A launch with the given arguments; the others are set before each launch."""
+    inputs = [given.get(argument.label, 0) for argument in kernel.adj.args]
+    return wp.launch(kernel, dim, inputs=inputs, device="cpu", record_cmd=True)
+
+
+def _filled(struct, buffers: Mapping[str, np.ndarray]):
+    """A struct of the kernels over the flat buffers."""
+    instance = struct()
+    for name in struct.vars:
+        setattr(instance, name, _on_device(buffers[name]))
+    return instance
+
+
+def _on_device(values: np.ndarray) -> wp.array:
+    """The array itself, as the kernels see it: nothing is copied."""
+    dtype = wp.dtype_from_numpy(values.dtype)
+    return wp.array(values, dtype=dtype, device="cpu", copy=False)

@@ -1,0 +1,54 @@
+"""What the layouts and precisions can simulate; the rest is refused instead of being left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from warp_springs.body.elements import NONE, Elements
+from warp_springs.body.variants import Variants
+from warp_springs.robot import Robot
+from warp_springs.scene import Scene
+
+__all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
+
+#: Springs that only the lanes know.
+SPRING_ELEMENTS = (
+    "harmonics",
+    "omegas",
+    "cubic",
+    "slope",
+    "hinges",
+    "dashpot",
+    "breaks",
+    "yields",
+    "timetable",
+)
+
+
+def elements_of(robots: Sequence[Robot]) -> list[Elements]:
+    """The elements of robots, each structure once or more."""
+    some = robots[:1] if isinstance(robots, Variants) else robots
+    return [robot.elements for robot in some if robot.elements is not NONE]
+
+
+def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
+    """What only the layout "lanes" can do here, in words; empty if nothing."""
+    if scene.collisions is not None:
+        return "Scene.collisions"
+    for elements in elements_of(robots):
+        for name in SPRING_ELEMENTS:
+            if getattr(elements, name) is not None:
+                return f"Elements.{name}"
+    return ""
+
+
+def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:
+    """Raise NotImplementedError for what the kernels cannot simulate."""
+    placed = bool(scene.obstacles) or scene.collisions is not None
+    for elements in elements_of(robots):
+        placed |= len(elements.bonds) > 0 or len(elements.tethers) > 0
+    if placed and precision == "mixed":
+        raise NotImplementedError(
+            "precision: 'mixed' counts positions from a moving origin, and knows no obstacles, "
+            "collisions, constraints or tethers; use 'float64' or 'float32'"
+        )

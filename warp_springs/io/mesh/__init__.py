@@ -1,0 +1,1 @@
+"""Meshes in any format that meshio knows, in and out."""

@@ -1,0 +1,1 @@
+"""Pages of HTML: robots in motion, documents, and what is served while a run lasts."""

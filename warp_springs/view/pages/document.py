@@ -1,0 +1,289 @@
+"""A report as one HTML file: text, tables, plots, pictures, videos and pages, all inside it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from warp_springs.io.outputs import checked_output, written_beside
+from warp_springs.view.pages import exhibits
+from warp_springs.view.pages.player import SUFFIXES, asset
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from warp_springs.result import Result
+
+__all__ = ["Document"]
+
+Cell = str | int | float
+
+MOST_FILM = 900_000
+"""Bytes that a film in a document takes at most."""
+MOST_PAGE = 1_600_000
+"""Letters that a page of robots in a document takes at most, unless it shows one robot."""
+
+_NAMED_GROUP = re.compile(r' id="[A-Za-z][\w.]*_\d+"')
+"""Names that matplotlib gives to the parts of every figure, the same in each; nothing uses them."""
+
+
+class Document:
+    """A report that is written from top to bottom and is one file at the end.
+
+    It needs no network and no other file, opens from the disk, and prints well: pages that play
+    are left out of print. The same content gives the same bytes.
+
+        report = ws.Document("A bouncing cube")
+        report.section("Energies")
+        report.row(report.plot(figure, "They add up to a constant."))
+        report.write("report.html")
+
+    Args:
+        title: What it is called.
+        subtitle: A line below the title.
+    """
+
+    def __init__(self, title: str, subtitle: str = "") -> None:
+        self.title = title
+        self.subtitle = subtitle
+        self._sections: list[str] = []
+        self._body: list[str] = []
+        self._plots = 0
+
+    # -- blocks, one below the other ---------------------------------------------------------------
+
+    def section(self, title: str) -> None:
+        """Begin a section; it is listed at the top."""
+        self._sections.append(title)
+        self._body.append(f'<h2 id="s{len(self._sections)}">{html.escape(title)}</h2>')
+
+    def heading(self, title: str) -> None:
+        """A heading within a section."""
+        self._body.append(f"<h3>{html.escape(title)}</h3>")
+
+    def text(self, *paragraphs: str) -> None:
+        """Paragraphs of plain text."""
+        self._body += [f"<p>{html.escape(words)}</p>" for words in paragraphs]
+
+    def verdict(self, words: str, good: bool = True) -> None:
+        """The one line that a reader must see."""
+        kind = "verdict" if good else "verdict bad"
+        self._body.append(f'<p class="{kind}">{html.escape(words)}</p>')
+
+    def tiles(self, facts: Iterable[tuple[str, str]]) -> None:
+        """Key figures side by side: (what it is, the figure)."""
+        tiles = (
+            f"<div><b>{html.escape(figure)}</b><span>{html.escape(name)}</span></div>"
+            for name, figure in facts
+        )
+        self._body.append(f'<div class="tiles">{"".join(tiles)}</div>')
+
+    def table(
+        self,
+        rows: Iterable[Sequence[Cell]],
+        header: Sequence[str] = (),
+        caption: str = "",
+    ) -> None:
+        """A table; numbers stand to the right, texts to the left."""
+        top = f"<caption>{html.escape(caption)}</caption>" if caption else ""
+        rows = [list(row) for row in rows]
+        if header:
+            numeric = [all(isinstance(row[i], (int, float)) for row in rows) for i in
+                       range(len(header))]  # fmt: skip
+            cells = (
+                f"<th{' class=number' if n and rows else ''}>{html.escape(name)}</th>"
+                for name, n in zip(header, numeric, strict=True)
+            )
+            top += f"<thead><tr>{''.join(cells)}</tr></thead>"
+        body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
+        self._body.append(f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>')
+
+    def code(self, *lines: str) -> None:
+        """Lines as they are typed."""
+        self._body.append(f"<pre>{html.escape(chr(10).join(lines))}</pre>")
+
+    def links(self, files: Iterable[tuple[str, str]]) -> None:
+        """Files beside the report: (path relative to it, what it is)."""
+        rows = "".join(
+            f'<tr><td><a href="{html.escape(path)}">{html.escape(path)}</a></td>'
+            f"<td>{html.escape(words)}</td></tr>"
+            for path, words in files
+        )
+        self._body.append(f'<div class="scroll"><table><tbody>{rows}</tbody></table></div>')
+
+    def row(self, *parts: str) -> None:
+        """What `plot`, `image`, `video` and `page` return, side by side where there is room."""
+        inside = "".join(parts)
+        self._body.append(f'<div class="row">{inside}</div>' if len(parts) > 1 else inside)
+
+    # -- parts of a row ----------------------------------------------------------------------------
+
+    def plot(self, figure: Figure, caption: str = "") -> str:
+        """A matplotlib figure as an inline drawing; dense scatters should be rasterised."""
+        self._plots += 1
+        drawing = _svg(figure, f"plot {self._plots}")
+        return _figure(drawing, caption)
+
+    def image(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "png") -> str:
+        """A picture or an animation of a kind that browsers show: png, webp, gif, jpeg."""
+        source = f"data:image/{kind};base64,{_base64(data)}"
+        return _figure(f'<img src="{source}" alt="{html.escape(caption)}">', caption)
+
+    def video(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "mp4") -> str:
+        """A video of a kind that browsers play: mp4, webm."""
+        source = f"data:video/{kind};base64,{_base64(data)}"
+        return _figure(
+            f'<video src="{source}" controls autoplay loop muted playsinline></video>', caption
+        )
+
+    def page(self, text: str, caption: str = "", printed: str = "") -> str:
+        """A whole page, for example one of `ws.html_page`, in a frame that can do no harm.
+
+        Args:
+            text: The page.
+            caption: What it shows.
+            printed: What stands in its place on paper.
+        """
+        frame = f'<iframe sandbox="allow-scripts" loading="lazy" title="{html.escape(caption)}"'
+        inside = f'{frame} srcdoc="{html.escape(text)}"></iframe>'
+        note = f'<p class="printed">{html.escape(printed)}</p>' if printed else ""
+        return _figure(inside, caption, "page") + note
+
+    def film(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: int | Sequence[int] | None = None,
+        start: float | None = None,
+        duration: float | None = None,
+    ) -> str:
+        """A film of recorded robots; H.264 with the extra ``video``, else an animated picture.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows.
+            robots: Who is in it; all that were recorded by default.
+            start: Where in the run it starts [s]; default its first frame.
+            duration: How much of the run it shows [s]; default all of it.
+        """
+        data, kind = exhibits.film(result, robots, MOST_FILM, start, duration)
+        put = self.video if kind == "mp4" else self.image
+        return put(data, caption, kind=kind)
+
+    def player(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: Sequence[int] | None = None,
+        names: Mapping[int, str] | None = None,
+        custom_data: Mapping[int, Mapping[str, Any]] | None = None,
+        title: str = "",
+    ) -> str:
+        """The page of `ws.html_page` in a frame, with as many of the robots as keep it small.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows; how to use it is added.
+            robots: Who is on it, the most important first; all that were recorded by default.
+            names: As in `ws.html_page`.
+            custom_data: As there.
+            title: As there.
+        """
+        shown = list(result.recorded if robots is None else robots)
+        page, count = exhibits.player(
+            result, shown, MOST_PAGE, names or {}, custom_data or {}, title or self.title
+        )
+        left_out = f" The first {count} of {len(shown)}." if count < len(shown) else ""
+        return self.page(
+            page,
+            f"{caption}{left_out} Drag to turn, zoom, slow down, choose a robot, colour its "
+            "springs by stress, material or actuation; press ? for the keys.",
+            printed="The file holds a page here in which the robots move; open it in a browser.",
+        )
+
+    def still(
+        self,
+        result: Result,
+        caption: str = "",
+        robots: Sequence[int] | None = None,
+        labels: Sequence[str] | None = None,
+    ) -> str:
+        """A picture of the last frame, each robot in a tile of its own.
+
+        Args:
+            result: With recorded frames.
+            caption: What it shows.
+            robots: Who is on it; all that were recorded by default.
+            labels: A text for each.
+        """
+        shown = list(result.recorded if robots is None else robots)
+        return self.image(exhibits.still(result, shown, labels), caption, kind="webp")
+
+    # -- the end -----------------------------------------------------------------------------------
+
+    def html(self) -> str:
+        """The whole file."""
+        entries = "".join(
+            f'<a href="#s{i}">{html.escape(title)}</a>'
+            for i, title in enumerate(self._sections, start=1)
+        )
+        return Template(asset("document.html")).substitute(
+            title=html.escape(self.title),
+            subtitle=f"<p>{html.escape(self.subtitle)}</p>" if self.subtitle else "",
+            contents=f'<nav aria-label="Sections">{entries}</nav>' if len(entries) > 1 else "",
+            style=asset("document.css"),
+            body="\n".join(self._body),
+        )
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the file, whole or not at all, and return its path.
+
+        Raises:
+            ValueError: The path does not end in ``.html``.
+            OSError: It cannot be written.
+        """
+        path = checked_output(path, SUFFIXES)
+        text = self.html()
+        with written_beside(path) as draft:
+            draft.write_text(text, encoding="utf-8")
+        return path
+
+
+def _svg(figure: Figure, salt: str) -> str:
+    """A figure as text that is the same whenever it is made, fit to stand beside others."""
+    import matplotlib
+
+    # The salt keeps the names of clip paths and markers apart from those of other figures.
+    settings = {"svg.fonttype": "none", "svg.hashsalt": salt}
+    with matplotlib.rc_context(settings), io.StringIO() as target:
+        nothing = {"Date": None, "Creator": None}
+        figure.savefig(target, format="svg", bbox_inches="tight", metadata=nothing)
+        text = target.getvalue()
+    drawing = text[text.index("<svg") :]
+    drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.S)
+    return _NAMED_GROUP.sub("", re.sub(r"\n\s*", "\n", drawing))
+
+
+def _figure(inside: str, caption: str, kind: str = "") -> str:
+    start = f'<figure class="{kind}">' if kind else "<figure>"
+    below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+    return f"{start}{inside}{below}</figure>"
+
+
+def _cell(value: Cell) -> str:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        words = f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
+        return f'<td class="number">{words}</td>'
+    return f"<td>{html.escape(str(value))}</td>"
+
+
+def _base64(data: bytes | os.PathLike[str]) -> str:
+    content = data if isinstance(data, bytes) else Path(data).read_bytes()
+    return base64.b64encode(content).decode()

@@ -1,0 +1,1 @@
+"""Pictures and films, drawn by the kernels of this package without a GPU."""
