@@ -5,11 +5,11 @@ import warnings
 
 import numpy as np
 import pytest
-import warp_springs.engine.method
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import warp_springs as ws
+import warp_springs.engine.method
 
 INTEGRATORS = ["chin4", "leapfrog", "euler"]
 LIMITS = {"chin4": np.sqrt(12.0), "leapfrog": 2.0, "euler": 2.0}  # of omega dt, springs alone
