@@ -7,18 +7,14 @@ run, so a process may be killed at any moment, even before its first generation.
 
 from __future__ import annotations
 
-import json
 import os
-import platform
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +22,7 @@ from evolve.config import RunConfig
 from evolve.errors import RunError, StoreError
 from evolve.judging.judge import Simulator
 from evolve.lock import Lock
+from evolve.provenance import decisive, origin
 from evolve.search import Generation, Search, judge_together
 from evolve.store import Store, Timing
 from evolve.toml import dump, load, parse, validate
@@ -35,7 +32,6 @@ __all__ = [
     "Run",
     "Session",
     "create_seeds",
-    "decisive",
     "evolve_together",
     "open_all",
 ]
@@ -161,7 +157,7 @@ class Run:
         Raises:
             StoreError, RunError: As `evolve`.
         """
-        meta = {"config": dump(self.config), **_origin()}
+        meta = {"config": dump(self.config), **origin()}
         with self._locked(), Store.create(self.record_path, meta, self.config.descriptors) as store:
             self._check_unchanged(store)
             with suppress(StoreError), self.exporting():
@@ -216,11 +212,11 @@ class Run:
 
     def _write_config(self) -> None:
         """Write run.toml, whole or not at all."""
-        origin = "".join(f"# {key}: {value}\n" for key, value in _origin().items())
+        made_by = "".join(f"# {key}: {value}\n" for key, value in origin().items())
         text = f"# Repeat this run: evolve run {self.directory / 'run.toml'} --out NEW_FOLDER\n"
         draft = self.directory / "run.toml.draft"
         with draft.open("w", encoding="utf-8") as file:
-            file.write(f"{text}{origin}\n{dump(self.config)}")
+            file.write(f"{text}{made_by}\n{dump(self.config)}")
             file.flush()
             os.fsync(file.fileno())
         draft.replace(self.directory / "run.toml")
@@ -377,40 +373,3 @@ def _refuse_occupied(directory: Path) -> None:
         )
     if others := sorted(names - {"run.lock", "run.lock-journal", "run.toml.draft"}):
         raise RunError(f"{directory} is not empty ({others[0]}); choose another place with --out")
-
-
-def decisive(config: RunConfig) -> dict[str, Any]:
-    """What decides the bits of a record: dotted key -> value."""
-    left_out = {
-        "name": True,
-        "about": True,
-        "generations": True,
-        "budget": True,
-        "simulation": {"threads", "devices", "cluster"},
-        "task": {"second_look"},
-    }
-    flat: dict[str, Any] = {}
-    _flatten(json.loads(config.model_dump_json(exclude=left_out)), "", flat)
-    return flat
-
-
-def _flatten(table: Mapping[str, Any], prefix: str, flat: dict[str, Any]) -> None:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            _flatten(value, f"{prefix}{key}.", flat)
-        else:
-            flat[prefix + key] = value
-
-
-def _origin() -> dict[str, str]:
-    """What made a run: versions and machine."""
-    packages = {name: _version(name) for name in ("warp-springs", "warp-lang", "numpy")}
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
-    return {**packages, "python": platform.python_version(), "machine": machine}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed as a package"

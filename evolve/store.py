@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evolve import schema
 from evolve.errors import StoreError
 from evolve.judging.scores import Scores
 from evolve.optimizers.base import NOBODY, Candidates
@@ -32,48 +33,6 @@ if TYPE_CHECKING:
     from evolve.judging.second_look import SecondLook
 
 __all__ = ["Finalist", "Record", "Store", "Timing"]
-
-APPLICATION_ID = 0x65766F6C
-"""Marks the files of this program among all SQLite files ("evol")."""
-SCHEMA_VERSION = 2
-
-SCHEMA = """
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE generation (
-    number INTEGER PRIMARY KEY,
-    evaluations INTEGER NOT NULL,         -- of the run, up to and with this generation
-    spring_evaluations INTEGER NOT NULL,  -- of this generation
-    evaluation_time REAL NOT NULL,        -- simulating and scoring [s]
-    driver_time REAL NOT NULL,            -- everything else [s]
-    finished TEXT NOT NULL DEFAULT (strftime('%Y-%m-%dT%H:%M:%fZ', 'now'))
-);
-CREATE TABLE individual (
-    id INTEGER PRIMARY KEY,
-    generation INTEGER NOT NULL REFERENCES generation (number),
-    fitness REAL,                         -- NULL: the robot was stopped
-    status INTEGER NOT NULL,              -- of warp_springs.Status
-    spring_evaluations INTEGER NOT NULL,
-    genome BLOB NOT NULL
-);
-CREATE TABLE parent (
-    child INTEGER NOT NULL REFERENCES individual (id),
-    place INTEGER NOT NULL,               -- 0: first parent, 1: second
-    parent INTEGER NOT NULL REFERENCES individual (id),
-    PRIMARY KEY (child, place)
-) WITHOUT ROWID;
-CREATE TABLE descriptor (individual INTEGER PRIMARY KEY REFERENCES individual (id){columns});
-CREATE TABLE second_look (
-    individual INTEGER PRIMARY KEY REFERENCES individual (id),
-    dt REAL NOT NULL,                     -- half the first step [s]
-    halved REAL,                          -- fitness at this step in float64
-    halved_kept REAL,                     -- that / first fitness
-    perturbed REAL,                       -- quantile of the fitness from perturbed starts
-    perturbed_kept REAL,                  -- that / first fitness
-    survives INTEGER NOT NULL             -- 1: enough is left of both
-);
-CREATE TABLE optimizer (name TEXT PRIMARY KEY, dtype TEXT NOT NULL, shape TEXT NOT NULL,
-    data BLOB NOT NULL) WITHOUT ROWID;
-"""
 
 
 @dataclass(frozen=True)
@@ -129,7 +88,7 @@ class Store:
     @classmethod
     def create(cls, path: Path, meta: Mapping[str, str], descriptors: Sequence[str]) -> Store:
         """Make the record of a run that has not begun, or open it if it is there already."""
-        if path.exists() and _has_tables(path):
+        if path.exists() and schema.has_tables(path):
             return cls.open(path, write=True)
         connection = sqlite3.connect(path, isolation_level=None)
         connection.execute("PRAGMA page_size = 16384")
@@ -138,11 +97,11 @@ class Store:
         columns = "".join(f', "{name}" REAL' for name in descriptors)
         store = cls(connection, path)
         with store._transaction():
-            for statement in SCHEMA.format(columns=columns).split(";"):
+            for statement in schema.SCHEMA.format(columns=columns).split(";"):
                 connection.execute(statement)
             connection.executemany("INSERT INTO meta VALUES (?, ?)", meta.items())
-            connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
-            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+            connection.execute(f"PRAGMA application_id = {schema.APPLICATION_ID}")
+            connection.execute(f"PRAGMA user_version = {schema.VERSION}")
         return store
 
     @classmethod
@@ -160,7 +119,7 @@ class Store:
         uri = f"{path.resolve().as_uri()}?mode={mode}"
         connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=30.0)
         try:
-            _check(connection, path, thoroughly=write)
+            schema.check(connection, path, thoroughly=write)
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute(f"PRAGMA query_only = {not write}")
         except BaseException:
@@ -177,9 +136,9 @@ class Store:
         """
         if path.is_file():
             with suppress(sqlite3.DatabaseError), closing(sqlite3.connect(path)) as connection:
-                application, version = _marks(connection)
-                if application == APPLICATION_ID:
-                    _check_version(path, version)
+                application, version = schema.marks(connection)
+                if application == schema.APPLICATION_ID:
+                    schema.check_version(path, version)
 
     def close(self) -> None:
         """Close the file; SQLite then folds its log into it."""
@@ -408,42 +367,3 @@ def _packed(item: tuple[str, np.ndarray]) -> tuple[str, str, str, bytes]:
     array = np.ascontiguousarray(array)
     array = array.astype(array.dtype.newbyteorder("<"))
     return name, array.dtype.str, json.dumps(array.shape), array.tobytes()
-
-
-def _has_tables(path: Path) -> bool:
-    """Whether a file is a record, or anything else than one that was killed at its creation."""
-    try:
-        with closing(sqlite3.connect(path)) as connection:
-            return bool(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
-    except sqlite3.DatabaseError:
-        return True
-
-
-def _check(connection: sqlite3.Connection, path: Path, thoroughly: bool) -> None:
-    """Refuse what is not a sound record of this version."""
-    try:
-        application, version = _marks(connection)
-        problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0] if thoroughly else "ok"
-    except sqlite3.DatabaseError as error:
-        raise StoreError(f"{path} cannot be read: {error}") from None
-    if application != APPLICATION_ID:
-        raise StoreError(f"{path} is not the record of an evolution")
-    _check_version(path, version)
-    if problem != "ok":
-        raise StoreError(f"{path} is damaged: {problem.splitlines()[-1]}")
-
-
-def _marks(connection: sqlite3.Connection) -> tuple[int, int]:
-    """Whose file it is, and the version of its format."""
-    names = ("application_id", "user_version")
-    application, version = (connection.execute(f"PRAGMA {n}").fetchone()[0] for n in names)
-    return application, version
-
-
-def _check_version(path: Path, version: int) -> None:
-    if version != SCHEMA_VERSION:
-        raise StoreError(
-            f"{path} was written by {'a newer' if version > SCHEMA_VERSION else 'an older'} "
-            f"version of evolve (format {version}, this one reads format {SCHEMA_VERSION}); "
-            "start its run.toml again with evolve run, or use that version"
-        )

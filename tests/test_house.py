@@ -1,6 +1,7 @@
 """Promises about the whole house: light imports, one-way data flow, seeds, the README."""
 
 import ast
+import importlib
 import re
 import subprocess
 import sys
@@ -28,6 +29,12 @@ def test_import_is_light(package):
     code = f"import sys, {package}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("package", ["warp_springs", "evolve"])
+def test_every_public_name_is_there(package):
+    module = importlib.import_module(package)
+    assert all(hasattr(module, name) for name in module.__all__)
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))

@@ -10,7 +10,8 @@ import numpy as np
 
 from evolve.config import RunConfig
 from evolve.fitness import UNITS
-from evolve.run import Run, decisive
+from evolve.provenance import decisive
+from evolve.run import Run
 from evolve.store import Finalist, Record
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from evolve.judging.scores import Scores
 from evolve.judging.second_look import SecondLook
 from evolve.lock import Lock
 from evolve.optimizers import NOBODY, Candidates
-from evolve.store import APPLICATION_ID, SCHEMA_VERSION, Finalist, Store, Timing
+from evolve.schema import APPLICATION_ID, VERSION
+from evolve.store import Finalist, Store, Timing
 
 DESCRIPTORS = ("height", "a name with spaces")
 
@@ -172,7 +173,7 @@ def test_a_record_of_another_format_is_refused(store, version, age):
     Store.check_format(store.path)
     with sqlite3.connect(store.path) as connection:
         connection.execute(f"PRAGMA user_version = {version}")
-    words = rf"{age} version of evolve \(format {version}, this one reads format {SCHEMA_VERSION}\)"
+    words = rf"{age} version of evolve \(format {version}, this one reads format {VERSION}\)"
     for refuse in (Store.open, Store.check_format):
         with pytest.raises(StoreError, match=words):
             refuse(store.path)
