@@ -26,6 +26,7 @@ from warp_springs.surfaces import Box, Circle, HeightField, Line, Plane, Sphere,
 
 __all__ = [
     "Box",
+    "Camera",
     "Circle",
     "Collisions",
     "Document",
@@ -76,6 +77,7 @@ except PackageNotFoundError:  # a source tree that was never installed
 # Names whose modules need pydantic, pxr, matplotlib, meshio or Pillow: loaded on first use.
 _LAZY = {
     "config": ("warp_springs.config", None),
+    "Camera": ("warp_springs.view.pictures.camera", "Camera"),
     "Document": ("warp_springs.view.pages.document", "Document"),
     "LiveLine": ("warp_springs.view.pages.live", "LiveLine"),
     "LiveServer": ("warp_springs.view.pages.live", "LiveServer"),
