@@ -1,9 +1,9 @@
 """How much better than random search? Optimizers x encodings, the same evaluations each.
 
-    python benchmarks/search.py                           # the walker, 3 seeds, about 12 minutes
-    python benchmarks/search.py --generations 15          # a smaller budget, about 2 minutes
-    python benchmarks/search.py --preset cube --json search.json
-    python benchmarks/search.py --optimizers all --encodings all --seeds 1 2 3 4 5
+    python benchmarks/search.py                          # three bodies, five seeds, 12 minutes
+    python benchmarks/search.py --generations 15         # a smaller budget
+    python benchmarks/search.py --presets cube --json search.json
+    python benchmarks/search.py --optimizers all --encodings all --presets walker --seeds 1 2
 
 Every search keeps its nine best; they are simulated again, at half the time step in float64 and
 from perturbed starts. The table shows the fittest who survives both, its fitness at half the step,
@@ -22,6 +22,7 @@ from typing import Annotated
 
 import numpy as np
 import tyro
+from rich.box import MARKDOWN
 from rich.console import Console
 from rich.table import Table
 from tyro.conf import arg
@@ -31,25 +32,27 @@ from evolve import ENCODINGS, OPTIMIZERS, Evaluator, Search, load
 
 BASELINE = "random"
 KEPT = 9
+WIDTH = 160
+"""Of the table, in letters."""
 
 
 @dataclass(frozen=True)
 class Options:
     """What to compare."""
 
-    preset: str = "walker"
-    """A preset or a TOML file."""
+    presets: tuple[str, ...] = ("walker", "tripod", "cube")
+    """Presets or TOML files."""
     optimizers: tuple[str, ...] = ("genetic", "hill_climber", BASELINE)
     """Which optimizers, "all" for all; each with its defaults, or with the preset's settings if it
-    has any."""
+    has any. One that cannot search an encoding is passed over."""
     encodings: tuple[str, ...] = ()
     """Which encodings, "all" for all, otherwise that of the preset."""
-    seeds: tuple[int, ...] = (1, 2, 3)
+    seeds: tuple[int, ...] = (1, 2, 3, 4, 5)
     """From which everything random follows."""
-    generations: int | None = None
-    """How many generations, otherwise as many as the preset has."""
-    population: int | None = None
-    """How many robots in each, otherwise as many as the preset has."""
+    generations: int = 60
+    """How many generations."""
+    population: int = 256
+    """How many robots in each."""
     output: Annotated[Path | None, arg(name="json")] = None
     """File to write the results to."""
 
@@ -58,6 +61,7 @@ class Options:
 class Outcome:
     """What one search found."""
 
+    preset: str
     optimizer: str
     encoding: str
     seed: int
@@ -71,12 +75,15 @@ class Outcome:
     springs_per_second: float
 
 
-def run(options: Options, optimizer: str, encoding: str, seed: int) -> Outcome:
-    """Search with one optimizer over one encoding from one seed."""
+def run(options: Options, preset: str, optimizer: str, encoding: str, seed: int) -> Outcome:
+    """Search with one optimizer over one encoding from one seed.
+
+    Raises:
+        ValueError: The optimizer cannot search this encoding.
+    """
     changes = {"encoding.type": encoding, "optimizer.type": optimizer, "seed": seed}
-    budget = {"generations": options.generations, "population": options.population}
-    changes |= {key: value for key, value in budget.items() if value is not None}
-    search = Search(load(options.preset, changes))
+    changes |= {"generations": options.generations, "population": options.population}
+    search = Search(load(preset, changes))
     search.prepare()
     started, cost, simulating = time.perf_counter(), 0, 0.0
     genomes, fitness = None, np.empty(0)
@@ -93,6 +100,7 @@ def run(options: Options, optimizer: str, encoding: str, seed: int) -> Outcome:
     look = Evaluator(search.config).second_look(robots, fitness)
     champion = int(look.survives.argmax())
     return Outcome(
+        preset=preset,
         optimizer=optimizer,
         encoding=encoding,
         seed=seed,
@@ -106,26 +114,21 @@ def run(options: Options, optimizer: str, encoding: str, seed: int) -> Outcome:
 
 
 def tabulate(outcomes: list[Outcome], options: Options) -> Table:
-    """Optimizers and encodings in the rows, seeds in the columns."""
-    baseline = {(o.encoding, o.seed): o.best for o in outcomes if o.optimizer == BASELINE}
-    config = load(options.preset)
-    budget = f"{outcomes[0].evaluations:,} evaluations"
-    table = Table(title=f"{config.name}: {config.task.fitness}, {budget}")
-    table.add_column("encoding")
-    table.add_column("optimizer")
-    for seed in options.seeds:
-        table.add_column(f"seed {seed}", justify="right")
-    for column in ("mean", "standard error", "lead", "springs/s"):
+    """Bodies, encodings and optimizers in the rows, seeds in the columns."""
+    baseline = {(o.preset, o.encoding, o.seed): o.best for o in outcomes if o.optimizer == BASELINE}
+    table = Table(title=f"{outcomes[0].evaluations:,} evaluations each", box=MARKDOWN)
+    for column in ("body", "encoding", "optimizer"):
+        table.add_column(column)
+    for column in (*map("seed {}".format, options.seeds), "mean", "error", "lead", "springs/s"):
         table.add_column(column, justify="right")
-    for encoding, optimizer in dict.fromkeys((o.encoding, o.optimizer) for o in outcomes):
-        row = [o for o in outcomes if (o.encoding, o.optimizer) == (encoding, optimizer)]
+    for key in dict.fromkeys((o.preset, o.encoding, o.optimizer) for o in outcomes):
+        row = [o for o in outcomes if (o.preset, o.encoding, o.optimizer) == key]
         best = np.array([o.best for o in row])
-        first = np.array([baseline.get((encoding, o.seed), np.nan) for o in row])
+        first = np.array([baseline.get((*key[:2], o.seed), np.nan) for o in row])
         error = best.std(ddof=1) / np.sqrt(len(best)) if len(best) > 1 else np.nan
         rate = np.mean([o.springs_per_second for o in row]) / 1e9
         table.add_row(
-            encoding,
-            optimizer,
+            *key,
             *map(cell, row),
             f"{best.mean():.3f}",
             f"{error:.3f}",
@@ -154,21 +157,26 @@ def chosen(
 def main() -> None:
     """Run every search in turn, then print the table."""
     options = tyro.cli(Options, description=__doc__)
-    usual = load(options.preset).encoding.type
     optimizers = chosen(options.optimizers, OPTIMIZERS, ())
-    encodings = chosen(options.encodings, ENCODINGS, (usual,))
     ws.quiet()
     console = Console()
     outcomes = []
-    for encoding, seed, optimizer in product(encodings, options.seeds, optimizers):
-        what = f"{optimizer} over {encoding}, seed {seed}"
-        with console.status(what):
-            outcomes.append(run(options, optimizer, encoding, seed))
-        last = outcomes[-1]
-        console.print(f"{what}: {last.best:.3f} in {last.seconds:.0f} s")
-        if options.output is not None:
-            options.output.write_text(json.dumps([asdict(o) for o in outcomes], indent=2) + "\n")
-    console.print(tabulate(outcomes, options))
+    for preset in options.presets:
+        config = load(preset)
+        encodings = chosen(options.encodings, ENCODINGS, (config.encoding.type,))
+        for encoding, seed, optimizer in product(encodings, options.seeds, optimizers):
+            what = f"{config.name}: {optimizer} over {encoding}, seed {seed}"
+            try:
+                with console.status(what):
+                    outcomes.append(run(options, preset, optimizer, encoding, seed))
+            except ValueError as error:
+                console.print(f"{what}: passed over: {error}")
+                continue
+            console.print(f"{what}: {outcomes[-1].best:.3f} in {outcomes[-1].seconds:.0f} s")
+            if options.output is not None:
+                data = json.dumps([asdict(outcome) for outcome in outcomes], indent=2)
+                options.output.write_text(data + "\n")
+    Console(width=max(console.width, WIDTH)).print(tabulate(outcomes, options))
     if options.output is not None:
         console.print(f"wrote {options.output}")
 
