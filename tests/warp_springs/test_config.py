@@ -322,3 +322,28 @@ def test_the_command_prints_the_reference(capsys):
 
     assert RunCommand(keys=True).run(Console()) == 0
     assert capsys.readouterr().out == reference(SceneFile)
+
+
+def test_robots_of_a_file_may_share_a_world():
+    text = SCENE_TOGETHER.replace("WORLD", "together")
+    config = parse(SceneFile, text, "scene.toml")
+    assert config.names == {0: "two"}
+    together = config.run()
+    assert len(together) == 1 and together.positions(0)[8:, 2].min() > 0.08  # it lies on the other
+    apart = parse(SceneFile, text.replace("together", "apart"), "scene.toml").run()
+    assert len(apart) == 2 and apart.positions(1)[:, 2].min() < 0.05
+
+
+SCENE_TOGETHER = """
+name = "two"
+[robot]
+positions = [[0.0, 0.0, 0.0], [0.01, 0.02, 0.12]]
+[robot.body]
+shape = "cube"
+[scene]
+damping = 2.0
+[scene.collisions]
+[simulation]
+duration = 0.5
+world = "WORLD"
+"""

@@ -32,6 +32,9 @@ class Timing(SimulationConfig):
 
     duration: float = Field(gt=0.0)
     """[s]"""
+    world: Literal["apart", "grid", "together"] = "apart"
+    """Each robot in a world of its own, side by side there, or all in one, where they collide if
+    there is a table [scene.collisions]."""
 
 
 class RecordConfig(Section):
@@ -100,7 +103,9 @@ class SceneFile(Section):
 
     @property
     def names(self) -> dict[int, str]:
-        """What each robot is called."""
+        """What each robot is called; robots of one world are one, called as the scene."""
+        if self.simulation.world == "together":
+            return {0: self.name}
         return dict(enumerate(self._built[1]))
 
     def make_simulation(self) -> Simulation:

@@ -146,7 +146,7 @@ class CollisionsConfig(Section):
 
     thickness: float = Field(0.0, ge=0.0)
     """Distance that surfaces keep [m]; 0: 4 % of the median spring."""
-    stiffness: float = Field(1e4, gt=0.0)
+    stiffness: float = Field(1e5, gt=0.0)
     """[N/m]"""
     static_friction: float = Field(1.0, ge=0.0)
     """Coefficient below which two surfaces do not slide."""

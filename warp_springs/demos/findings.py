@@ -11,7 +11,15 @@ if TYPE_CHECKING:
     from warp_springs.config import SceneFile
     from warp_springs.result import Result
 
-__all__ = ["bounces", "findings", "peak_deceleration", "period", "predicted_period", "slack"]
+__all__ = [
+    "bounces",
+    "findings",
+    "heights",
+    "peak_deceleration",
+    "period",
+    "predicted_period",
+    "slack",
+]
 
 Row = tuple[str, str]
 
@@ -30,7 +38,7 @@ def findings(config: SceneFile, result: Result) -> list[Row]:
         "breathing-cube": _breathing,
         "worm": _breathing,
         "soft-legs": _legs,
-        "ten-cubes": _rest,
+        "ten-cubes": _pile,
         "cable-pendulum": _pendulum,
     }
     return measured[config.name](config, result) if config.name in measured else []
@@ -81,12 +89,22 @@ def _legs(config: SceneFile, result: Result) -> list[Row]:
     ]
 
 
-def _rest(config: SceneFile, result: Result) -> list[Row]:
-    kinetic = result.energy.kinetic[:, -1] if result.energy is not None else np.zeros(1)
-    return [
-        ("kinetic energy left", f"at most {1000.0 * kinetic.max():.2g} mJ"),
-        ("bounces", ", ".join(str(bounces(result, i)) for i in result.recorded)),
-    ]
+def heights(config: SceneFile, result: Result) -> np.ndarray:
+    """How high the centre of each robot of one world is at the end [m], shape (N,)."""
+    robots = config.build_robots()
+    parts = np.split(result.positions(0)[:, 2], np.cumsum([r.n_masses for r in robots])[:-1])
+    return np.array([z @ r.masses / r.mass for z, r in zip(parts, robots, strict=True)])
+
+
+def _pile(config: SceneFile, result: Result) -> list[Row]:
+    rows = []
+    if result.energy is not None:
+        left = result.energy.kinetic[0, -1]
+        rows.append(("kinetic energy left", f"{1000.0 * left:.2g} mJ"))
+    if len(result) == 1:  # in a world together
+        told = ", ".join(f"{100.0 * height:.1f}" for height in np.sort(heights(config, result)))
+        rows.append(("heights of their centres", f"{told} cm"))
+    return rows
 
 
 def period(result: Result, robot: int = 0) -> float:

@@ -72,7 +72,7 @@ FIELDS = {
 """Arrays of a robot whose range is told."""
 MOST_ROBOTS = 12
 """Different robots beyond which the table tells no more."""
-_DIMENSIONLESS = ("water.density",)
+_DIMENSIONLESS = ("water.density", "collisions.damping")
 
 
 def parameters(config: SceneFile, result: Result) -> list[Row]:
