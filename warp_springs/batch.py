@@ -343,8 +343,9 @@ class Batch:
             for name, values in collision_buffers(robot, bodies, self._scene.collisions).items():
                 self._append(name, values.astype(dtype_of(name, method.precision)))
         # A stiffness that vanishes would be divided by.
-        vanished = fields["stiffness"].astype(real) == 0.0
-        invalid |= not_finite(np.where(vanished, np.nan, 0.0), strip.counts)
+        vanished = fields["stiffness"].astype(real, copy=False) == 0.0
+        if vanished.any():
+            invalid |= largest(vanished, strip.counts) > 0.0
         longest = longest_springs(strip)
         elastic = largest(fields["stiffness"], strip.counts) * strip.counts * longest**2
         self.rounding[strip.ids] = np.finfo(real).eps * elastic

@@ -205,12 +205,23 @@ def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndar
     Rayleigh's quotient along it.
     """
     fields = strip.fields
-    start, end = _ends(strip)
     w = 1.0 / fields["masses"]
     if "bond_table" in fields:  # what is held may be as good as infinitely heavy
         w = np.where((fields["bond_table"][:, :3] == 1.0).all(axis=1), w, 0.0)
-    certain = np.sqrt(largest(_softest(fields) * (w[start] + w[end]), strip.counts))
+    certain = np.sqrt(largest(_softest(fields) * _sum_of_ends(strip, w), strip.counts))
     return certain * dt > _limit(0.0 * certain, integrator)
+
+
+def _sum_of_ends(strip: Strip, values: np.ndarray) -> np.ndarray:
+    """What the two masses of each spring have together, from values of all masses, flat."""
+    if not strip.shared:
+        start, end = _ends(strip)
+        return values[start] + values[end]
+    start, end = strip.springs.T
+    rows = values.reshape(len(strip.ids), -1)
+    if (rows == rows[0]).all():  # the controllers of one body
+        return np.tile(rows[0, start] + rows[0, end], len(rows))
+    return (rows[:, start] + rows[:, end]).ravel()
 
 
 def _ends(strip: Strip) -> tuple[np.ndarray, np.ndarray]:

@@ -122,7 +122,11 @@ class FixedBody:
         centres = self.middles[rng.integers(len(self.own), size=n)]
         reach = float(np.linalg.norm(np.ptp(self.middles, axis=0)))
         radii = rng.random(n) * (0.5 * reach)
-        squared = sum((self.middles[:, i] - centres[:, i, None]) ** 2 for i in range(3))
+        squared = np.zeros((n, len(self.own)))
+        for i in range(3):
+            gap = self.middles[:, i] - centres[:, i, None]
+            gap *= gap
+            squared += gap
         return squared <= radii[:, None] ** 2
 
     def half_spaces(self, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -130,9 +134,11 @@ class FixedBody:
         normals = rng.standard_normal((n, 3))
         through = self.middles[rng.integers(len(self.own), size=n)]
         # Written out: a matrix product might add up differently on another number of threads.
-        offsets = sum(
-            normals[:, i, None] * (self.middles[:, i] - through[:, i, None]) for i in range(3)
-        )
+        offsets = np.zeros((n, len(self.own)))
+        for i in range(3):
+            gap = self.middles[:, i] - through[:, i, None]
+            gap *= normals[:, i, None]
+            offsets += gap
         return offsets > 0.0
 
 

@@ -123,7 +123,7 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     """Springs in rows by their lower mass, in each row by the higher one.
 
     Returns:
-        ``order``: all springs of all robots, sorted into rows, robot by robot;
+        ``order``: all springs of all robots, sorted into rows, robot by robot; a slice if they are;
         ``row``: for each topology its M + 1 row starts, counted from 0;
         ``partner``: for each topology the higher mass of each sorted spring.
     """
@@ -134,7 +134,7 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     lower = lower + np.repeat(mass_start, counts)
     step, along = np.diff(lower), np.diff(higher)
     in_rows = ((step > 0) | ((step == 0) & (along >= 0))).all()  # as the shapes make them
-    order = slice(None) if in_rows and not strip.shared else np.lexsort((higher, lower))
+    order = slice(None) if in_rows else np.lexsort((higher, lower))
     partner = higher[order]
 
     ends = np.cumsum(np.bincount(lower, minlength=masses.sum()))  # where the row of a mass ends
@@ -142,7 +142,7 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     inner = np.ones(len(row), bool)
     inner[mass_start + np.arange(topologies)] = False
     row[inner] = ends - np.repeat(spring_start, masses)
-    if strip.shared:
+    if strip.shared and not in_rows:
         shift = np.arange(len(strip.ids)) * len(order)
         order = (order + shift[:, None]).ravel()
     return order, row.astype(np.int32), partner.astype(np.int32)
@@ -302,10 +302,14 @@ def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:
     """
     if width == 1:
         return values.ravel()
-    bundles, size = -(-robots // width), values.size // robots
-    lanes = np.minimum(np.arange(bundles * width), robots - 1)
-    block = values.reshape(robots, size)[lanes].reshape(bundles, width, size)
-    return block.transpose(0, 2, 1).ravel()
+    full, size = robots // width, values.size // robots
+    rows, left = values.reshape(robots, size), robots % width
+    block = np.empty((full + (left > 0), size, width), values.dtype)
+    block[:full] = rows[: full * width].reshape(full, width, size).transpose(0, 2, 1)
+    if left:
+        block[full, :, :left] = rows[full * width :].T
+        block[full, :, left:] = rows[-1][:, None]
+    return block.ravel()
 
 
 def aligned(parts: Sequence[np.ndarray], dtype: np.dtype) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -122,7 +123,7 @@ class Tape:
     """What one slice records in one run, and how far it has come.
 
     Attributes:
-        members: Robots of the slice, shape (n,).
+        members: Robots of the slice, shape (n,), if energies are asked for.
         recorded: Those whose frames are kept.
         frames: Their positions [m], flat, shape (F, 3 * sum of M).
         energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
@@ -147,7 +148,9 @@ class Tape:
             return robots[(bundle >= self.slice.first) & (bundle < self.slice.last)]
 
         count = len(self.frame_steps)
-        self.members = inside(np.arange(len(self.slots.bundle)))
+        # Who records nothing need not know whom it steps.
+        everyone = np.arange(len(self.slots.bundle) if self.energy else 0)
+        self.members = inside(everyone)
         self.recorded = inside(self.recorded)
         self._state = self.slots.state_indices(self.recorded)
         self.frames = np.empty((count, len(self._state)))
@@ -245,8 +248,16 @@ def _filled(struct, buffers: Mapping[str, np.ndarray]):
     """A struct of the kernels over the flat buffers."""
     instance = struct()
     for name in struct.vars:
-        setattr(instance, name, _on_device(buffers[name]))
+        # Most buffers of most batches are empty: nothing to look at, and dear to make.
+        values = buffers[name]
+        setattr(instance, name, _on_device(values) if values.size else _empty(values.dtype))
     return instance
+
+
+@functools.cache
+def _empty(dtype: np.dtype) -> wp.array:
+    """An array without elements."""
+    return _on_device(np.empty(0, dtype))
 
 
 def _on_device(values: np.ndarray) -> wp.array:
