@@ -236,27 +236,34 @@ def _positive(values: np.ndarray) -> np.ndarray:
 
 
 def _limit(share: np.ndarray, integrator: str) -> np.ndarray:
-    """The largest stable phase sqrt(ws^2 + wg^2) dt, where tan(share) = wg / ws, from a table."""
-    shares, limits = _limits(integrator)
-    cell = np.clip(np.searchsorted(shares, share, side="right") - 1, 0, len(shares) - 2)
+    """The largest stable phase sqrt(ws^2 + wg^2) dt, where tan(share) = wg / ws.
+
+    From a table of shares, of which only the rows are worked out that somebody needs: the whole
+    takes longer than to load the kernels.
+    """
+    cell = np.clip(np.searchsorted(_SHARES, share, side="right") - 1, 0, len(_SHARES) - 2)
+    rows = np.unique(np.concatenate([np.zeros(1, int), cell, cell + 1]))
+    limits = np.zeros(len(_SHARES))
+    limits[rows] = [_limit_of_row(row, integrator) for row in rows.tolist()]
     return np.where(share <= 0.0, limits[0], np.minimum(limits[cell], limits[cell + 1]))
 
 
+_SHARES = np.linspace(0.0, np.pi / 2, 257)
+
+
 @functools.cache
-def _limits(integrator: str) -> tuple[np.ndarray, np.ndarray]:
+def _limit_of_row(row: int, integrator: str) -> float:
     """Stability of the linear test problem x'' = -(ws^2 + wg^2) x, springs kicking, ground exact.
 
     The map of one step is a product of kicks and drifts with determinant one: bounded while
     its trace stays within 2 in size.
     """
-    shares = np.linspace(0.0, np.pi / 2, 257)
     phases = np.linspace(0.0, 8.0, 4001)[1:]
-    springs = np.cos(shares)[:, None] * phases
-    ground = np.sin(shares)[:, None] * phases
+    springs, ground = np.cos(_SHARES[row]) * phases, np.sin(_SHARES[row]) * phases
     stable = np.abs(_trace(springs, ground, integrator)) <= 2.0 + 1e-9
     stable &= ground <= _LARGEST_GROUND_PHASE[integrator]
-    first_unstable = np.where(stable.all(axis=1), len(phases) - 1, np.argmin(stable, axis=1))
-    return shares, phases[np.maximum(first_unstable - 1, 0)]
+    first_unstable = len(phases) - 1 if stable.all() else int(np.argmin(stable))
+    return float(phases[max(first_unstable - 1, 0)])
 
 
 def _trace(springs: np.ndarray, ground: np.ndarray, integrator: str) -> np.ndarray:
