@@ -11,6 +11,7 @@ import tyro
 from tyro.conf import subcommand
 
 from evolve.commands.export import Export
+from evolve.commands.lineage import Lineage
 from evolve.commands.presets import Presets
 from evolve.commands.results import Digest, Report
 from evolve.commands.run import Resume, Run
@@ -22,7 +23,7 @@ __all__ = ["main"]
 FAILURES = (RunError, ValueError, OSError, RuntimeError, MemoryError, sqlite3.Error)
 """What may happen to a person; anything else is our own mistake and shows where it was made."""
 
-Command = Presets | Run | Resume | Report | Export | Digest
+Command = Presets | Run | Resume | Report | Export | Lineage | Digest
 
 COMMANDS: dict[str, type[Command]] = {
     "presets": Presets,
@@ -30,6 +31,7 @@ COMMANDS: dict[str, type[Command]] = {
     "resume": Resume,
     "report": Report,
     "export": Export,
+    "lineage": Lineage,
     "digest": Digest,
 }
 

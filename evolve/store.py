@@ -32,7 +32,7 @@ from evolve.optimizers.base import NOBODY, Candidates
 if TYPE_CHECKING:
     from evolve.judging.second_look import SecondLook
 
-__all__ = ["Finalist", "Record", "Store", "Timing"]
+__all__ = ["Ancestor", "Finalist", "Record", "Store", "Timing"]
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,18 @@ class Finalist:
     """That fitness / fitness."""
     survives: bool
     """Whether enough is left of both."""
+
+
+@dataclass(frozen=True)
+class Ancestor:
+    """An individual in the line of descent of another."""
+
+    id: int
+    generation: int
+    fitness: float
+    """NaN = none."""
+    parents: tuple[int, ...]
+    """Ids of its parents: none, one or two."""
 
 
 class Store:
@@ -242,6 +254,27 @@ class Store:
         """The ids of an individual's parents, the first parent first; none of the first ones."""
         query = "SELECT parent FROM parent WHERE child = ? ORDER BY place"
         return [row[0] for row in self._connection.execute(query, (int(individual),))]
+
+    def ancestors(self, individual: int) -> list[Ancestor]:
+        """An individual and everybody it descends from, the youngest first.
+
+        Raises:
+            StoreError: There is no such individual.
+        """
+        rows = self._connection.execute(
+            "WITH RECURSIVE line(id) AS (SELECT ? UNION SELECT parent FROM parent JOIN line "
+            "ON child = line.id) SELECT id, generation, fitness, "
+            "(SELECT parent FROM parent WHERE child = id AND place = 0), "
+            "(SELECT parent FROM parent WHERE child = id AND place = 1) "
+            "FROM line JOIN individual USING (id) ORDER BY id DESC",
+            (individual,),
+        ).fetchall()
+        if not rows:
+            raise StoreError(f"{self.path} has no individual {individual}")
+        return [
+            Ancestor(*row[:2], np.nan if row[2] is None else row[2], tuple(p for p in row[3:] if p))
+            for row in rows
+        ]
 
     def judged(self, at_once: int = 1024) -> Iterator[tuple[list[bytes], Scores]]:
         """All genomes with their scores, some at a time, in the order of the ids."""

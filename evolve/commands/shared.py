@@ -39,6 +39,11 @@ class Extras:
     """Also write report.html at the end, which takes some seconds of filming."""
     csv: Flag = False
     """Also write record.csv at the end: every evaluation as a row."""
+    parquet: Flag = False
+    """The same as record.parquet; needs the extra "parquet"."""
+    tensorboard: Flag = False
+    """Also write the curve for TensorBoard, into the folder of the run, as it grows; needs the
+    extra "tensorboard"."""
 
 
 def evolve_to_the_end(
@@ -64,6 +69,10 @@ def evolve_to_the_end(
     try:
         with ExitStack() as stack:
             tell = [screen.update, *_live(stack, together, extras, console)]
+            if extras.tensorboard:
+                from evolve.reports.tensorboard import Curves
+
+                tell.append(stack.enter_context(Curves(together)).update)
             watches = [partial(_tell_all, tell, i) for i in range(len(together))]
             with interruptible() as stopping, screen.showing(stopping):
                 complete = evolve_together(together, watches, stopping.is_set)
@@ -122,12 +131,15 @@ def _finish(run: runs.Run, console: Console, extras: Extras) -> None:
     with run.read() as store:
         facts = dict(results(store, run.config))
     print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")
-    tables = []
-    if extras.csv:
-        from evolve.reports.tables import write_csv
+    print_written([run.record_path, *_tables(run, extras), *animations, *plots])
 
-        tables.append(write_csv(run))
-    print_written([run.record_path, *tables, *animations, *plots])
+
+def _tables(run: runs.Run, extras: Extras) -> list[Path]:
+    """Write the tables that are asked for."""
+    from evolve.reports.tables import write_table
+
+    wanted = {"record.csv": extras.csv, "record.parquet": extras.parquet}
+    return [write_table(run, run.directory / name) for name, asked in wanted.items() if asked]
 
 
 def print_written(paths: Sequence[Path]) -> None:

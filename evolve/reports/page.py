@@ -19,7 +19,7 @@ from evolve.reports.figures import clock, demotions, describe, metric, results, 
 from evolve.reports.findings import findings
 from evolve.reports.parameters import parameters
 from evolve.reports.plots import dot_plot, figure, learning_curve, performance
-from evolve.reports.tables import write_csv
+from evolve.reports.tables import write_table
 from evolve.run import Run
 from evolve.store import Finalist, Record, Store
 
@@ -132,7 +132,7 @@ def write_report(
         _findings(report, subject, several, notes)
         _parameters(report, subject, store)
         _again(report, subject, runs, store)
-    table = write_csv(run)
+    table = write_table(run, run.directory / "record.csv")
     progress("writing")
     _files(report, run, path)
     return [report.write(path), table]

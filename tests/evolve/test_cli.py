@@ -30,7 +30,7 @@ def test_help_is_fast_and_names_every_command(shell):
         seconds.append(time.perf_counter() - started)
         assert done.returncode == 0
     assert min(seconds) < 1.5
-    for name in ("presets", "run", "resume", "report", "export", "digest"):
+    for name in ("presets", "run", "resume", "report", "export", "lineage", "digest"):
         assert name in done.stdout
         detail = shell(name, "--help")
         assert detail.returncode == 0 and len(detail.stdout) > 200
@@ -228,7 +228,7 @@ def test_a_command_line_without_sense_is_explained(shell):
 
 def test_a_broken_record_is_one_clear_line(shell, run_folder):
     (run_folder / "run.sqlite").write_bytes(b"rubbish" * 1000)
-    for name in ("resume", "report", "export", "digest"):
+    for name in ("resume", "report", "export", "lineage", "digest"):
         done = shell(name, "runs/cube")
         assert done.returncode == 1
         assert done.stderr == (
@@ -241,7 +241,7 @@ def test_a_run_of_an_older_version_is_one_clear_line(shell, run_folder):
         connection.execute("PRAGMA user_version = 1")
     path = run_folder / "run.toml"
     path.write_text("[task]\nsecond_look = 0.8\n")
-    for name in ("resume", "report", "export", "digest"):
+    for name in ("resume", "report", "export", "lineage", "digest"):
         done = shell(name, "runs/cube")
         assert done.returncode == 1 and done.stderr.count("\n") == 1
         assert "was written by an older version of evolve (format 1" in done.stderr

@@ -17,7 +17,7 @@ from evolve.reports.findings import findings
 from evolve.reports.page import write_report
 from evolve.reports.parameters import parameters
 from evolve.reports.plots import figure, performance
-from evolve.reports.tables import write_csv
+from evolve.reports.tables import write_table
 from evolve.run import Run
 from evolve.store import Finalist, Record, Store
 from evolve.toml import load
@@ -181,7 +181,7 @@ def test_diversity_falls_when_everybody_is_alike(runs, tmp_path):
 
 
 def test_a_table_of_the_record_has_everybody_and_their_parents(runs, tmp_path):
-    path = write_csv(runs[0], tmp_path / "record.csv")
+    path = write_table(runs[0], tmp_path / "record.csv")
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     with runs[0].read() as store:
