@@ -47,8 +47,8 @@ class Curves:
         values = {
             "fitness/best": progress.best_fitness,
             "fitness/median": progress.median,
-            "robots/without fitness": progress.failures,
-            "speed/springs per second": progress.springs_per_second,
+            "robots/without_fitness": progress.failures,
+            "speed/springs_per_second": progress.springs_per_second,
         }
         for name, value in values.items():
             if math.isfinite(value):

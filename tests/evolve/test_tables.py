@@ -67,7 +67,7 @@ def test_tensorboard_gets_the_curve(run):
         fitness = np.fmax.accumulate(store.record().fitness)[[23, 47, 71, 95]]
     assert list(curve["fitness/best"]) == [24, 48, 72, 96]
     np.testing.assert_allclose(list(curve["fitness/best"].values()), fitness, rtol=1e-6)
-    assert min(curve["speed/springs per second"].values()) > 0.0
+    assert min(curve["speed/springs_per_second"].values()) > 0.0
 
 
 def test_ancestors_are_found_as_by_walking_up_the_tree(run):
