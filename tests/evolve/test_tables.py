@@ -95,9 +95,10 @@ def test_lineage_ends_with_the_fittest(run):
     assert done.returncode == 0, done.stderr
     with run.read() as store:
         (best,) = store.best(1)
-        rows = [line.split() for line in done.stdout.splitlines()[3:] if line.strip()]
+        rows = [line.split() for line in done.stdout.splitlines() if line.startswith(" ")]
+        rows = [row for row in rows if row and row[0].startswith("#")]
         assert rows[-1][0] == f"#{best}" and rows[0][-1] == "unrelated"
-        numbers = [int(row[0][1:]) for row in rows if row[0].startswith("#")]
+        numbers = [int(row[0][1:]) for row in rows]
         for parent, child in pairwise(numbers):
             assert parent in store.parents_of(child)
     nobody = shell("lineage", "cube", "--of", "1000")
