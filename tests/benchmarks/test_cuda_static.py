@@ -1,9 +1,12 @@
 """The CUDA kernels, compiled ahead of time and taken apart: no GPU is needed for that."""
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks import cuda_static
 from warp_springs.engine.layouts import BLOCK_SIZES
+from warp_springs.kernels.traits import Traits
 
 CASES = [
     ("block", "float32", "walking", "leapfrog", True),
@@ -24,6 +27,32 @@ def test_kernels_compile_without_spills(case, arch, tmp_path):
     assert {name: row["spilled"] for name, row in used.items() if row["spilled"]} == {}
     expected = {"advance"} if layout == "block" else {"kick", "find", "settle", "wind", "tick"}
     assert expected <= used.keys()
+
+
+SPECIAL = Traits(
+    outer=True,
+    skin=True,
+    bound=True,
+    harmonics=2,
+    own_omegas=True,
+    curved=True,
+    hinges=1,
+    dashpots=True,
+    limits=True,
+    timetable=True,
+)
+
+
+@pytest.mark.parametrize(
+    ("layout", "precision"), [("block", "float32"), ("block", "float64"), ("flat", "mixed")]
+)
+def test_elements_of_every_kind_compile_without_spills(layout, precision, tmp_path):
+    about = replace(cuda_static.features(layout, precision, "walking", ledger=True), traits=SPECIAL)
+    path = cuda_static.compiled(about, 90, BLOCK_SIZES[precision][-1], tmp_path)
+    used = cuda_static.resources(path)
+    assert {name: row["spilled"] for name, row in used.items() if row["spilled"]} == {}
+    steps = {"advance"} if layout == "block" else {"kick_rates", "last_kick_middle", "find"}
+    assert steps <= used.keys()
 
 
 @pytest.mark.parametrize("layout", ["block", "flat"])

@@ -53,7 +53,14 @@ CASES = {
         ),
         True,
     ),
+    "springs": (
+        {"integrator": "chin4", "precision": "float64"},
+        ws.Scene(ground=ws.Ground(), damping=0.2, drag=0.01),
+        True,
+    ),
 }
+#: Cases whose robots have springs of every kind.
+SPECIAL = ("springs", "classroom", "passive")
 #: Largest difference [m] that rounding may make.
 TOLERANCE = {"float64": 1e-13, "mixed": 1e-6, "float32": 2e-5}
 
@@ -103,7 +110,9 @@ def population(case):
     if case == "far":
         return [robot.moved((1000, -500, 0)).moving((20, -10, 0)) for robot in robots]
     if case in ("elements", "passive"):
-        return [with_elements(robot) for robot in robots]
+        robots = [with_elements(robot) for robot in robots]
+    if case in SPECIAL:
+        robots = [with_springs(robot) for robot in robots]
     return robots
 
 
@@ -113,6 +122,20 @@ def with_elements(robot):
     robot = robot.pushed([3], (0, -1, 0), start=0.02).tethered(0, 200.0, point=(0, 0, 0.3))
     robot = robot.fixed([2], "x").held_to(ws.Sphere(robot.positions[5], 0.05), [4])
     return robot.shod(static_friction=0.1, kinetic_friction=0.05, masses=[6, 7])
+
+
+def with_springs(robot):
+    """Springs of every kind, some of which break or yield; timetables of different lengths."""
+    s = np.arange(robot.n_springs)
+    times = np.linspace(0.0, 0.12, robot.n_masses % 3 + 2)
+    robot = robot.with_cables([1, 3]).with_hardening(2e5, [4, 5, 6]).with_dashpots(0.05)
+    robot = robot.with_limits(breaks=np.where(s % 5 == 0, 6.0, 1e9))
+    robot = robot.with_limits(yields=4e4, area=1e-4, springs=[7, 8, 9, 11, 12])
+    robot = robot.with_stiffness_in_time(times, 1.0 + 10 * times, [2, 9])
+    robot = robot.with_winch(times, -0.1 * times, [1])
+    if robot.is_actuated:
+        robot = robot.with_harmonics([0.001, 0.002], [0.5, 1.0]).with_omegas(17.0, springs=[2, 13])
+    return robot
 
 
 @functools.cache
@@ -152,6 +175,13 @@ def test_every_layout_moves_robots_as_the_lanes_do(case, kind, launches_too):
     if scene.ground:
         assert expected.energy.ground.max() > 0.0
         assert expected.energy.losses[:, -1].max() > 1e-4
+    if case in SPECIAL:
+        for i in range(len(result)):
+            np.testing.assert_array_equal(result.broken(i), expected.broken(i))
+            apart = np.abs(result.yielded(i) - expected.yielded(i))
+            assert apart.max() < TOLERANCE[options["precision"]]
+        assert np.isfinite(expected.broken(0)).sum() > 1 and expected.yielded(0).any()
+        assert expected.energy.plastic_loss[0, -1] > 1e-3 < expected.energy.dashpot_loss[0, -1]
 
 
 def fingerprint(result, robot):
@@ -199,10 +229,10 @@ def test_bits_do_not_depend_on_the_threads():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_splitting_and_looking_change_no_bit(kind, launches_too):
-    options, scene, actuated = CASES["everything"]
+    options, scene, _ = CASES["springs"]
     launches_too["flat"] = getattr(crowd, kind)
     layout = "block" if kind == "Blocks" else "flat"
-    robots = bodies(actuated)
+    robots = population("springs")
     plain = ws.Simulation(robots, scene, dt=DT, layout=layout, **options).run(0.06)
     simulation = ws.Simulation(robots, scene, dt=DT, layout=layout, **options)
     simulation.run(0.0305, fps=200, record=[1])
@@ -271,8 +301,6 @@ def test_what_cannot_run_is_refused_in_one_line():
         ws.Simulation(cube, device="toaster")
     with pytest.raises(ValueError, match=r"layout: got 'rows', expected 'auto' or 'lanes'"):
         ws.Simulation(cube, layout="rows")
-    with pytest.raises(NotImplementedError, match=r"Elements.* 'lanes'"):
-        ws.Simulation(cube.with_cables(), layout="flat")
     big = ws.shapes.lattice(10, 10, 10)
     with pytest.raises(
         ValueError, match=r"robots\[1\] has 1331 masses, 'block' expects 384 or fewer"

@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group
-from warp_springs.engine.gathering import Bodies, Lists, arrays
+from warp_springs.engine.gathering import WEAR, Bodies, Lists, arrays, ranges, worn_springs
 from warp_springs.engine.layouts import block_size
 from warp_springs.engine.packing import aligned
 from warp_springs.kernels.block import BLOCK, block
@@ -95,6 +95,10 @@ class Crowd:
         )
         self._robots, self._slots = last - first, len(self._lists.home)
         springs, masses = rows[:, BUNDLE.index("springs")], rows[:, BUNDLE.index("masses")]
+        self._worn_in = {
+            name: ranges(rows[:, BUNDLE.index(column)], len(nothing) * springs)
+            for name, (column, nothing) in (WEAR if self.features.traits.limits else {}).items()
+        }
         self.work = int((springs + 2 * masses).sum()) * self._division
         self._given = {
             "slots": self._slots,
@@ -166,6 +170,9 @@ class Crowd:
             launch.set_param_by_name("step", own)
             launch.set_param_by_name("wanted", self._chosen(which))
             launch.launch()
+        for name, here in self._worn_in.items():
+            values, columns = getattr(self._given["state"], name).numpy(), len(WEAR[name][1])
+            self.buffers[name][here] = worn_springs(values, columns, self._lists, self.features)
         if not self.device.is_cpu:
             for name, here in self._seen_in.items():
                 self.buffers[name][here] = getattr(self._given["seen"], name).numpy()

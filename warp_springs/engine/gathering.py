@@ -14,13 +14,15 @@ import numpy as np
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE
 from warp_springs.kernels.gather import GatherFeatures, lane_order
 
-__all__ = ["Bodies", "Lists", "arrays", "ranges"]
+__all__ = ["WEAR", "Bodies", "Lists", "arrays", "ranges", "worn_springs"]
 
 #: Masses that are sorted by their number of springs, so that the lists of a slice are of about the
 #: same length; few, so that neighbours in space stay neighbours in memory.
 WINDOW = 512
 #: Slots whose sums are taken together.
 CHUNK_SLOTS = 256
+#: What stepping changes of springs with limits: where a bundle keeps it, and what whole ones have.
+WEAR = {"worn": ("worn", [0.0, 1.0]), "broken_at": ("broken", [np.nan])}
 
 
 def ranges(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -204,6 +206,9 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         table["lane"] - table["lane"].min(),
         first_chunk,
         chunk_count,
+        np.cumsum(table["times"] + 1) - (table["times"] + 1),
+        table["times"],
+        np.full(n, table["times"].max()),
     ]
     positions = bodies.values("positions", "state", 3 * masses).reshape(-1, 3)
     quads = np.zeros((len(lists.home), 4), positions.dtype)
@@ -215,6 +220,7 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         return _by_lane(values, lists, features)
 
     mixed, traits = {}, features.traits
+    coefficients = _coefficients(bodies, lists, features)
     own = {"obstacles": bodies.buffers["obstacles"], "heights": bodies.buffers["heights"]}
     if traits.skin:
         own["skins"] = by_lane("skins", "skin")
@@ -222,6 +228,9 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         own["bonds"] = by_lane("bonds", "bond", 10)
     if traits.outer:
         own |= _outer(bodies, lists, features)
+    own |= _of_ends(bodies, lists, features)
+    if traits.dashpots:
+        own["rates"] = own["middle_rates"] = np.zeros(4 * len(lists.home))
     if features.precision == "mixed":
         for name in ("low_positions", "low_velocities"):
             mixed[name] = mixed[f"good_{name}"] = by_lane(name)
@@ -234,7 +243,7 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         "slices": lists.sites,
         "chunks": chunks,
         "neighbours": lists.neighbours,
-        "coefficients": _coefficients(bodies, lists, features),
+        "coefficients": coefficients,
         "homes": _homes(lists, features),
         "omegas": bodies.values("omegas", "lane", one),
         "turns": waves[:, 2:],
@@ -298,19 +307,75 @@ def _homes(lists: Lists, features: GatherFeatures) -> np.ndarray:
 
 
 def _coefficients(bodies: Bodies, lists: Lists, features: GatherFeatures) -> np.ndarray:
-    """Coefficients of all rows: [row][column][lane] for registers, else [row][slot][column]."""
-    width, columns = features.width, 4 if features.actuated else 2
-    counts = bodies.counts[bodies.topology]
-    values = bodies.values("coefficients", "spring", columns * counts).reshape(-1, columns)
-    table = np.zeros((lists.rows * width, columns), values.dtype)
-    table[:, 0] = 1.0  # a spring that does not pull
+    """Coefficients of both ends of all springs; see ``_by_end``."""
+    columns = features.traits.columns(features.actuated)
+    values = bodies.values("coefficients", "spring", columns * bodies.counts[bodies.topology])
+    nothing = np.zeros(columns)
+    nothing[0] = 1.0  # a spring that does not pull
+    if features.traits.limits:
+        nothing[-2:] = np.inf
+    return _by_end(values, nothing, lists, features)
+
+
+def _of_ends(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, np.ndarray]:
+    """What the ends of springs have besides their coefficients; see ``_by_end``."""
+    counts, traits, found = bodies.counts[bodies.topology], features.traits, {}
+
+    def add(name: str, column: str, nothing: list[float]) -> None:
+        values = bodies.values(name, column, len(nothing) * counts)
+        found[name] = _by_end(values, np.array(nothing), lists, features)
+
+    if traits.own_omegas:
+        add("spring_omegas", "own_omega", [0.0])
+        add("spring_oscillators", "turning", [0.0, 1.0, 1.0, 0.0])
+    if traits.limits:
+        for name, (column, nothing) in WEAR.items():
+            add(name, column, nothing)
+    if traits.timetable:
+        found["times"] = bodies.values("times", "time", bodies.table["times"] + 1)
+        schedules = _schedules(bodies)
+        nothing = np.tile([1.0, 0.0], schedules.shape[1] // 2)
+        found["schedules"] = _by_end(schedules, nothing, lists, features)
+    return found
+
+
+def _schedules(bodies: Bodies) -> np.ndarray:
+    """The schedules of all springs, with room for the longest one's times, (sum of S, 2 T)."""
+    times, counts = bodies.table["times"], bodies.counts[bodies.topology]
+    first = np.cumsum(counts) - counts
+    table = np.zeros((counts.sum(), 2 * times.max()))
+    for length in np.unique(times):
+        which = np.flatnonzero(times == length)
+        values = bodies.values("schedules", "schedule", 2 * length * counts[which], which)
+        table[ranges(first[which], counts[which]), : 2 * length] = values.reshape(-1, 2 * length)
+    return table
+
+
+def _by_end(
+    values: np.ndarray, nothing: np.ndarray, lists: Lists, features: GatherFeatures
+) -> np.ndarray:
+    """Values (sum of S, n) at both ends of each spring: [row][n][lane] for registers, else
+    [row][slot][n]; ``nothing`` (n,) where there is no spring."""
+    width, columns = features.width, len(nothing)
+    table = np.tile(nothing.astype(values.dtype), (lists.rows * width, 1))
     for cells in lists.cells:
-        table[cells] = values
+        table[cells] = values.reshape(-1, columns)
     if not features.vector:
         return table
     lanes = np.empty((lists.rows, columns, width), values.dtype)
     lanes[:, :, lane_order(features)] = table.reshape(-1, width, columns).transpose(0, 2, 1)
     return lanes
+
+
+def worn_springs(
+    values: np.ndarray, columns: int, lists: Lists, features: GatherFeatures
+) -> np.ndarray:
+    """The values of each spring, from those of its ends: what ``_by_end`` laid out, flat."""
+    width = features.width
+    if features.vector:
+        lanes = values.reshape(lists.rows, columns, width)[:, :, lane_order(features)]
+        values = lanes.transpose(0, 2, 1)
+    return values.reshape(-1, columns)[lists.cells[0]].ravel()
 
 
 def _chunks(lists: Lists) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

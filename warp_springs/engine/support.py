@@ -11,19 +11,6 @@ from warp_springs.scene import Scene
 
 __all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
 
-#: Springs that only the lanes know.
-SPRING_ELEMENTS = (
-    "harmonics",
-    "omegas",
-    "cubic",
-    "slope",
-    "hinges",
-    "dashpot",
-    "breaks",
-    "yields",
-    "timetable",
-)
-
 
 def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     """The elements of robots, each structure once or more."""
@@ -33,13 +20,7 @@ def elements_of(robots: Sequence[Robot]) -> list[Elements]:
 
 def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
     """What only the layout "lanes" can do here, in words; empty if nothing."""
-    if scene.collisions is not None:
-        return "Scene.collisions"
-    for elements in elements_of(robots):
-        for name in SPRING_ELEMENTS:
-            if getattr(elements, name) is not None:
-                return f"Elements.{name}"
-    return ""
+    return "Scene.collisions" if scene.collisions is not None else ""
 
 
 def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:

@@ -29,8 +29,9 @@ const bool inside = thread < mine[1] * SLICE;
 const int slot = first_slot + (inside ? thread : 0), slice = slot / SLICE;
 const int robot = model.slices.data[slice * SITE_COLUMNS];
 const int robot_slot = model.robots.data[robot * ROBOT_COLUMNS];
-const Slot at = {slice, slot % SLICE, robot, slot - first_slot, robot_slot - first_slot};
-const Slot outside = {slice, slot % SLICE, robot, slot, robot_slot};
+const Slot at = {slice, slot % SLICE, robot, slot - first_slot, robot_slot - first_slot,
+                 robot_slot};
+const Slot outside = among_all(at);
 const bool leader = inside && slot == robot_slot;
 const bool is_mass = inside && model.homes.data[slot] >= 0;
 
@@ -53,7 +54,17 @@ real power = zero;
 bool moving = is_mass && state.states.data[robot] == 0;
 meet();
 
+auto find_rates = [&](bool shifted, scalar time, bool start) {
+    if (!DASHPOTS) return;
+    if (moving) rate_slot(at, now(), then(), low, velocity, shifted, start || EULER);
+    meet();
+    if (EULER) return;
+    if (moving) middle_slot(at, now(), then(), low, sine, cosine, time, shifted);
+    meet();
+};
 auto move = [&](bool shifted, scalar time, bool start, bool last) {
+    if (LIMITS && moving && !shifted) wear_slot(at, now(), sine, cosine);
+    find_rates(shifted, time, start);
     if (moving)
         move_slot(at, now(), then(), low, velocity, rest, sine, cosine, shifted, time, start, last);
     flip();
@@ -101,8 +112,14 @@ auto check = [&](long long n) {
     meet();
 #endif
 };
-auto set_oscillators = [&](long long n) { oscillator(robot, n, sine, cosine); };
-auto turn_oscillators = [&]() { if (ACTUATED) turn(robot, sine, cosine); };
+auto set_oscillators = [&](long long n) {
+    oscillator(robot, n, sine, cosine);
+    if (inside) set_ends(at, n);
+};
+auto turn_oscillators = [&]() {
+    if (ACTUATED) turn(robot, sine, cosine);
+    if (inside) turn_ends(at);
+};
 auto prepare = []() {};
 auto begin = []() {};
 auto end = []() {};

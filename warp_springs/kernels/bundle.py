@@ -200,7 +200,8 @@ auto diagnose = [=]() -> mask {
         if (OBSTACLES) deep |= depth_in_obstacles(a) > zero + depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
-            stretched |= squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
+            const mask far = squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
+            stretched |= LIMITS ? far & is_whole(spring_of(s)) : far;
         }
     }
     const mask finite = poison == zero;
@@ -434,7 +435,8 @@ if (LEDGER) {
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = seen_here[partner[s]];
             const real length2 = squared_length(b.x - a.x, b.y - a.y, b.z - a.z);
-            springs += SPECIAL ? special_energy(length2, s)
+            springs += SPECIAL
+                ? special_energy(length2, spring_of(s), Instant{sine, cosine, omega, table})
                 : spring_energy(length2, stiffness(s), half_rest_force(s, sine, cosine));
         }
     }

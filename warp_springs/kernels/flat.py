@@ -75,9 +75,23 @@ look_up_origin(robot);
 
 auto slices = [=](auto work) __attribute__((always_inline)) {
     for (int slice = first_slice; slice < past_slice; ++slice)
-        work(Slot{slice, 0, robot, slice * W, 0});
+        work(Slot{slice, 0, robot, slice * W, 0, 0});
+};
+auto find_rates = [&](bool shifted, scalar time, bool start) {
+    if (!DASHPOTS) return;
+    slices([&](Slot at) {
+        rate_slot(at, now(), then(), low_at(at), velocity_at(at), shifted, start || EULER);
+    });
+    meet();
+    if (EULER) return;
+    slices([&](Slot at) {
+        middle_slot(at, now(), then(), low_at(at), sine, cosine, time, shifted);
+    });
+    meet();
 };
 auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__((always_inline)) {
+    if (LIMITS && !shifted) slices([&](Slot at) { wear_slot(at, now(), sine, cosine); });
+    find_rates(shifted, time, start);
     slices([&](Slot at) __attribute__((always_inline)) {
         Vec low = low_at(at);
         Sum v = velocity_at(at);
@@ -138,8 +152,15 @@ auto check = [&](long long n) {
     meet();
 #endif
 };
-auto set_oscillators = [&](long long n) { oscillator(robot, n, sine, cosine); };
-auto turn_oscillators = [&]() { if (ACTUATED) turn(robot, sine, cosine); };
+auto set_oscillators = [&](long long n) {
+    oscillator(robot, n, sine, cosine);
+    if (OWN_OMEGAS) slices([&](Slot at) { set_ends(at, n); });
+};
+auto turn_oscillators = [&]() {
+    if (!ACTUATED) return;
+    turn(robot, sine, cosine);
+    if (OWN_OMEGAS) slices([&](Slot at) { turn_ends(at); });
+};
 auto prepare = []() {};
 auto begin = []() {};
 auto end = []() {};
@@ -221,7 +242,8 @@ const long long n = clock.data[0] + offset;
 const long long buffer = 4 * (long long)slots;
 const int slice = slot / SLICE;
 const int robot = model.slices.data[slice * SITE_COLUMNS];
-const Slot at = {slice, slot % SLICE, robot, slot, model.robots.data[robot * ROBOT_COLUMNS]};
+const int root = model.robots.data[robot * ROBOT_COLUMNS];
+const Slot at = {slice, slot % SLICE, robot, slot, root, root};
 const bool leader = slot == at.base, stopped = state.states.data[robot] != 0;
 look_up_origin(robot);
 """
@@ -229,33 +251,54 @@ look_up_origin(robot);
 #: Checks that only mixed precision needs.
 MIXED_ONLY = ("measure", "follow")
 
-_PASS = r"""
+# What the passes of a step and those before them have in common.
+_WITHIN = r"""
 const int side = (int)((n + PASS) & 1);
 scalar* const now = state.positions.data + side * buffer;
 scalar* const then = state.positions.data + (1 - side) * buffer;
 const scalar* const wave = state.oscillators.data + 2 * ((long long)side * robots + robot);
-scalar* const next = state.oscillators.data + 2 * ((long long)(1 - side) * robots + robot);
 const scalar sine = wave[0], cosine = wave[1];
+const bool moving = !stopped && model.homes.data[slot] >= 0;
+const double begin = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+kick_begin = PASS ? begin + part : EULER || n == 0 ? begin : begin - part;
+kick_end = EULER ? begin + exact_dt : PASS ? begin + exact_dt - part : begin + part;
+begin_step(PASS ? begin + 0.5 * exact_dt : begin);
+const bool shifted = PASS == 2, start = PASS == 0 && n == 0, last = !CHIN4 || PASS == 2;
+const scalar time = EULER ? dt : PASS == 2 ? GRADIENT_KICK
+    : start ? FIRST_KICK : FIRST_KICK * scalar(2);
+"""
+
+_PASS = r"""
+scalar* const next = state.oscillators.data + 2 * ((long long)(1 - side) * robots + robot);
 if (leader && ACTUATED) {
     scalar si = sine, co = cosine;
     if (PASS != 1) turn(robot, si, co);
     next[0] = si; next[1] = co;
 }
-if (stopped || model.homes.data[slot] < 0) return;
-Vec low = low_at(at);
-const double begin = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
-kick_begin = PASS ? begin + part : EULER || n == 0 ? begin : begin - part;
-kick_end = EULER ? begin + exact_dt : PASS ? begin + exact_dt - part : begin + part;
-if (PASS == 1) shift_slot(at, now, then, low, sine, cosine);
-else {
-    const bool start = PASS == 0 && n == 0, last = !CHIN4 || PASS == 2;
-    const scalar time = EULER ? dt : PASS == 2 ? GRADIENT_KICK
-        : start ? FIRST_KICK : FIRST_KICK * scalar(2);
-    Sum v = velocity_at(at);
-    real* const rest = state.rests.data + (OBSTACLES ? OBSTACLES : 1) * (long long)slot;
-    move_slot(at, now, then, low, v, rest, sine, cosine, PASS == 2, time, start, last);
-    keep(at, low, v);
+if (moving) {
+    Vec low = low_at(at);
+    if (PASS == 1) shift_slot(at, now, then, low, sine, cosine);
+    else {
+        if (PASS == 0 && !DASHPOTS) wear_slot(at, now, sine, cosine);
+        Sum v = velocity_at(at);
+        real* const rest = state.rests.data + (OBSTACLES ? OBSTACLES : 1) * (long long)slot;
+        move_slot(at, now, then, low, v, rest, sine, cosine, shifted, time, start, last);
+        keep(at, low, v);
+    }
 }
+if (PASS != 1) turn_ends(at);
+"""
+
+# Before a kick, where there are dashpots.
+_RATES = r"""
+if (!moving) return;
+if (PASS == 0) wear_slot(at, now, sine, cosine);
+rate_slot(at, now, then, low_at(at), velocity_at(at), shifted, start || EULER);
+"""
+
+_MIDDLE = r"""
+if (!moving) return;
+middle_slot(at, now, then, low_at(at), sine, cosine, time, shifted);
 """
 
 _FIND = r"""
@@ -272,6 +315,7 @@ Sum v = velocity_at(at);
 settle(at, stopped || state.flags.data[robot] != 0, now,
        state.positions.data + (1 - side) * buffer, low, v);
 keep(at, low, v);
+set_ends(at, n);
 """
 
 _WIND = r"""
@@ -371,11 +415,17 @@ def launches(features: GatherFeatures) -> Launches:
     def tick(clock: wp.array(dtype=wp.int64), steps: int):
         clock[0] = clock[0] + wp.int64(steps)
 
-    steps = [
-        kernel(job, f"const int PASS = {index};\n" + _LAUNCHES + _PASS)
-        for index, (job, integrators) in enumerate(JOBS.items())
-        if features.integrator in integrators
-    ]
+    damped = {"rates": _RATES} if features.traits.dashpots else {}
+    if damped and features.integrator != "euler":
+        damped["middle"] = _MIDDLE
+    steps = []
+    for index, (job, integrators) in enumerate(JOBS.items()):
+        if features.integrator not in integrators:
+            continue
+        within = f"const int PASS = {index};\n" + _LAUNCHES + _WITHIN
+        if job != "shift":
+            steps += [kernel(f"{job}_{name}", within + snippet) for name, snippet in damped.items()]
+        steps.append(kernel(job, within + _PASS))
     check = [
         (kernel("find", _LAUNCHES + _FIND), "slots"),
         (kernel("settle", _LAUNCHES + _SETTLE), "slots"),

@@ -39,7 +39,7 @@ from warp_springs.kernels.dialect import (
     vector_dialect,
 )
 from warp_springs.kernels.law import CONSTANTS, LAW
-from warp_springs.kernels.slot_loads import SCALAR_LOADS, SLOT, vector_loads
+from warp_springs.kernels.slot_loads import ENDS, SCALAR_LOADS, SLOT, vector_loads
 from warp_springs.kernels.slot_passes import SLOT_PASSES
 
 __all__ = [
@@ -69,6 +69,9 @@ ROBOT = (
     "lane",  # its place where what is seen has one value a robot
     "chunk",  # first chunk, see kernels.look
     "chunks",
+    "time",  # first of its timetable's times
+    "times",
+    "moments",  # for how many times all schedules have room
 )
 #: Columns of the table of slices.
 SITE = (
@@ -89,7 +92,10 @@ MODEL = {
     "slices": np.int32,
     "chunks": np.int32,
     "neighbours": np.int32,  # four times the slot, counted from the robot's first
-    "coefficients": REAL,  # k, h, or k, ha, hs, hc: N/m, N
+    "coefficients": REAL,  # k, h, or k, ha, hs, hc: N/m, N; then as kernels.springs says
+    "spring_omegas": np.float64,  # of each end, rad/s, where springs have their own
+    "times": np.float64,  # of each robot's timetable, and its period, s
+    "schedules": REAL,  # of each end: factor of the stiffness, and what is added to h
     "homes": np.int32,  # the user's number of a slot's mass, -1 for padding
     "omegas": np.float64,  # rad/s
     "turns": REAL,  # cos(w dt), sin(w dt) of half a step of chin4, or of a step
@@ -121,6 +127,11 @@ STATE = {
     "ledgers": REAL,  # [slice][ACCOUNTS][slot], J
     "good_ledgers": REAL,
     "oscillators": REAL,  # two buffers of sin(wt), cos(wt) for each robot
+    "spring_oscillators": REAL,  # sin(wt), cos(wt), cos(w dt), sin(w dt) of each end
+    "worn": REAL,  # of each end: how far the spring has flowed, m, and 1, or 0 where it is broken
+    "broken_at": np.float64,  # of each end, s
+    "rates": REAL,  # quads: what the dashpots see of the velocities as a kick begins, m/s
+    "middle_rates": REAL,  # and in the middle of it
     "states": np.int32,  # Status
     "state_times": np.float64,  # s
     "flags": np.int32,  # reasons to stop a robot, found by the check; and by a look
@@ -151,7 +162,8 @@ class GatherFeatures(Features):
     def together(self) -> int:
         """Springs whose coefficients fill 16 bytes, which a GPU loads at once."""
         small = real_dtype(self.precision).itemsize == 4
-        return 2 if small and not self.vector and not self.actuated else 1
+        plain = not self.actuated and not self.traits.special
+        return 2 if small and not self.vector and plain else 1
 
 
 def slice_width(layout: str, precision: str) -> int:
@@ -183,7 +195,9 @@ def passes(features: GatherFeatures) -> str:
     lines = [f"const int {name} = {value};" for name, value in sizes.items()]
     lines += [f"const scalar {name} = run.{name};" for name in CONSTANTS]
     lines += ["const double exact_dt = run.exact_dt;"]
-    lines += ["auto begin_step = [](double) {}; auto middle_of_step = begin_step;"]
+    lines += ["double instant = 0;  // at which timetables are read [s]"]
+    lines += ["auto begin_step = [&](double now) { instant = now; };"]
+    lines += ["auto middle_of_step = begin_step;"]
     lines += ["const double* const obstacles = model.obstacles.data;"]
     lines += ["const double* const heights = model.heights.data;"]
     if features.vector:
@@ -191,7 +205,7 @@ def passes(features: GatherFeatures) -> str:
         loads = vector_loads(features.width)
     else:
         dialect, loads = scalar_dialect(features.precision), SCALAR_LOADS
-    return dialect + flags + "\n".join(lines) + _ORIGIN + LAW + SLOT + loads + SLOT_PASSES
+    return dialect + flags + "\n".join(lines) + _ORIGIN + LAW + SLOT + loads + ENDS + SLOT_PASSES
 
 
 _TABLES = {"robot": ROBOT, "site": SITE, "chunk": CHUNK}

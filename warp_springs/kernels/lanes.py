@@ -154,7 +154,7 @@ _NO_LEDGER = "auto enter_work = [](scalar) {};"
 
 # What else happens in a step.
 _CLOCK = r"""
-auto begin_step = [&](double now) { wear(now); consult_timetable(now); };
+auto begin_step = [&](double now) { consult_timetable(now); wear(now); };
 auto middle_of_step = [&](double now) { consult_timetable(now); };
 """
 

@@ -1,8 +1,8 @@
 """A look at a crowd, for every layout that gathers: it changes nothing.
 
-Five kernels in turn: the reasons to stop a robot; the positions that are shown, good ones for a
-stopped robot; what each mass contributes; sums over runs of slots; sums over robots. The sums are
-taken in float64, in an order that depends on the robot alone.
+Kernels in turn: the reasons to stop a robot; the positions that are shown, good ones for a stopped
+robot; what dashpots see, where there are any; what each mass contributes; sums over runs of slots;
+sums over robots. The sums are taken in float64, in an order that depends on the robot alone.
 """
 
 import functools
@@ -20,8 +20,8 @@ __all__ = ["Look", "look"]
 _SITE = r"""
 const int slice = index / (SLICE / W);
 const int robot = model.slices.data[slice * SITE_COLUMNS];
-const Slot at = {slice, index % (SLICE / W), robot, index * W,
-                 model.robots.data[robot * ROBOT_COLUMNS]};
+const int root = model.robots.data[robot * ROBOT_COLUMNS];
+const Slot at = {slice, index % (SLICE / W), robot, index * W, root, root};
 if (!wanted.data[robot]) return;
 const scalar* const now = state.positions.data + side * 4 * (long long)slots;
 int* const flag = state.flags.data + robots + robot;
@@ -41,7 +41,8 @@ if (stopped) a = load(state.good_positions.data, at);
 keep_quad(shown.data, at, a, w);
 """
 
-_LOOK = r"""
+# A mass at the instant of the look.
+_SEEN = r"""
 real w;
 const Vec a = own_quad(shown.data, at, w);
 const Vec low = MIXED ? load(stopped ? state.good_low_positions.data : state.low_positions.data, at)
@@ -51,22 +52,41 @@ const Sum u = load_sum(state.velocities.data, state.low_velocities.data, at);
 const scalar sine = state.oscillators.data[2 * ((long long)side * robots + robot)];
 const scalar cosine = state.oscillators.data[2 * ((long long)side * robots + robot) + 1];
 const real si = zero + sine, co = zero + cosine;
-const double now_time = double((long long)step) * exact_dt;
-kick_end = now_time;
-kick_begin = now_time - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+kick_end = instant = double((long long)step) * exact_dt;
+kick_begin = instant - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
+const bool kicked = !EULER && step > 0;  // the last part of the kicks is still to come
+"""
+
+# What the dashpots see, in that part.
+_RATES = r"""
+if (kicked) rate_slot(at, shown.data, nullptr, low, u, false, false);
+"""
+_MIDDLE = r"""
+if (kicked) middle_slot(at, shown.data, nullptr, low, sine, cosine, FIRST_KICK, false);
+"""
+
+_LOOK = r"""
 const Own own = own_of(at, a, nullptr);
-const Force sum = gather(at, shown.data, a, sine, cosine);
+const scalar* const rates = DASHPOTS && kicked ? state.middle_rates.data : nullptr;
+const Force sum = gather(at, shown.data, a, sine, cosine, rates);
 Sum v = u;
 Losses losses = {};
 Accounts accounts = open_accounts(stopped ? state.good_ledgers.data : state.ledgers.data, at);
-if (!EULER && step > 0) synchronise(v, sum.f, in_world(x), w, own, losses);
+if (kicked) synchronise(v, sum.f, in_world(x), w, own, losses);
 if (LEDGER && !stopped) {
     enter(accounts.values, losses, u, v, w);
-    if (ACTUATED && !EULER && step > 0) accounts.values[0] += sum.power * FIRST_KICK;
+    if ((ACTUATED || TIMETABLE) && kicked) accounts.values[0] += sum.power * FIRST_KICK;
+    if (DASHPOTS && kicked) accounts.values[5] += sum.dash_power * FIRST_KICK;
 }
 if (stopped) v = load_sum(state.good_velocities.data, state.good_low_velocities.data, at);
 real springs = zero;
-if (LEDGER)
+if (LEDGER && SPECIAL)
+    each_end(at, [&](const unsigned* j, long long, const Spring& spring) {
+        const Vec d = neighbours_of(shown.data + 4 * at.base, j) - a;
+        springs += special_energy(squared_length(d.x, d.y, d.z), spring,
+                                  instant_of(robot, sine, cosine)) * scalar(0.5);
+    });
+else if (LEDGER)
     each_spring(at, shown.data, [&](Vec b, real k, real ha, real hs, real hc) {
         const Vec d = b - a;
         springs += spring_energy(squared_length(d.x, d.y, d.z), k,
@@ -219,13 +239,15 @@ def look(features: GatherFeatures) -> Look:
 
         return launch
 
+    over_sites = {"find": _FIND, "show": _SHOW}
+    if features.traits.dashpots and features.integrator != "euler":
+        over_sites |= {"rates": _SEEN + _RATES, "middle": _SEEN + _MIDDLE}
+    over_sites["look"] = _SEEN + _LOOK
     return Look(
         [
-            kernel("find", _SITE + _FIND),
-            kernel("show", _SITE + _SHOW),
-            kernel("look", _SITE + _LOOK),
+            *(kernel(name, _SITE + snippet) for name, snippet in over_sites.items()),
             kernel("add", _ADD),
             kernel("report", _REPORT),
         ],
-        ["sites", "sites", "sites", "chunks", "robots"],
+        [*["sites"] * len(over_sites), "chunks", "robots"],
     )

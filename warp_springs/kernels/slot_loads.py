@@ -2,12 +2,36 @@
 
 from warp_springs.kernels.dialect import quad_operations
 
-__all__ = ["SCALAR_LOADS", "SLOT", "vector_loads"]
+__all__ = ["ENDS", "SCALAR_LOADS", "SLOT", "vector_loads"]
 
 # Where a thread works: one slot of a slice, or, where the slots are lanes, all of them (lane 0).
-# `own` is its place in the buffers of positions, and `base` that of its robot's first slot.
+# `own` is its place in the buffers of positions, and `base` that of its robot's first slot; `root`
+# is the number of that slot among all.
 SLOT = r"""
-struct Slot { int slice, lane, robot, own, base; };
+struct Slot { int slice, lane, robot, own, base, root; };
+// The same slot where buffers hold all slots.
+auto among_all = [=](Slot at) -> Slot {
+    return Slot{at.slice, at.lane, at.robot, at.slice * SLICE + at.lane, at.root, at.root};
+};
+"""
+
+# The springs of a slot that have more to them than k and L0: what each end has of its own lies in
+# rows as the coefficients do, and changes in the same way from both ends.
+ENDS = r"""
+auto each_end = [=](Slot at, auto work) __attribute__((always_inline)) {
+    const int* const site = model.slices.data + (long long)at.slice * SITE_COLUMNS;
+    const int length = site[3];
+    const int moments = TIMETABLE ? model.robots.data[at.robot * ROBOT_COLUMNS + 8] : 0;
+    const unsigned* j = (const unsigned*)model.neighbours.data + (long long)site[1] * SLICE
+        + at.lane;
+    long long end = (long long)site[2] * SLICE + at.lane;
+    for (int e = 0; e < length; ++e, j += SLICE, end += SLICE)
+        work(j, end, Spring{(const real*)(model.coefficients.data + K * end),
+                            (real*)(state.spring_oscillators.data + 4 * end),
+                            model.spring_omegas.data + end,
+                            (const real*)(model.schedules.data + 2 * moments * end),
+                            (real*)(state.worn.data + 2 * end)});
+};
 """
 
 
@@ -94,6 +118,10 @@ auto in_slice = [=](scalar* values, Slot at, int rows) -> real* {
     return values + (long long)at.slice * rows * SLICE + at.lane;
 };
 const int STRIDE = SLICE;
+auto neighbours_of = [=](const scalar* where, const unsigned* j) -> Vec {
+    const Quad q = *(const Quad*)(where + *j);
+    return Vec{q.x, q.y, q.z};
+};
 auto each_spring = [=](Slot at, const scalar* where, auto work) {
     const Four site = *(const Four*)(model.slices.data + (long long)at.slice * SITE_COLUMNS);
     const int length = site.w, columns = ACTUATED ? 4 : 2;

@@ -26,10 +26,38 @@ auto store_sum = [=](scalar* values, scalar* lows, Slot at, const Sum& sum)
     store(values, at, a);
     if (MIXED) store(lows, at, low);
 };
-// Half of the power of each breathing spring belongs to either end.
-struct Force { Vec f; real power; };
-auto gather = [=](Slot at, const scalar* where, Vec a, scalar sine, scalar cosine)
-        __attribute__((always_inline)) -> Force {
+auto instant_of = [&](int robot, scalar sine, scalar cosine)
+        __attribute__((always_inline)) -> Instant {
+    const int* const about = model.robots.data + robot * ROBOT_COLUMNS;
+    const scalar omega = LEDGER ? scalar(model.omegas.data[robot]) : scalar(0);
+    Instant now = {zero + sine, zero + cosine, zero + omega, Table{}};
+    if (TIMETABLE) now.table = table_at(model.times.data + about[6], about[7], instant);
+    return now;
+};
+// Half of the power of each spring belongs to either end. `rates`: what the dashpots see of the
+// velocities, or null.
+struct Force { Vec f; real power, dash_power; };
+auto gather_special = [&](Slot at, const scalar* where, Vec a, scalar sine, scalar cosine,
+                          const scalar* rates) __attribute__((always_inline)) -> Force {
+    const Instant now = instant_of(at.robot, sine, cosine);
+    const bool damped = DASHPOTS && rates != nullptr;
+    real w;
+    const Vec own_rate = damped ? own_quad(rates, among_all(at), w) : Vec{};
+    Force sum = {};
+    each_end(at, [&](const unsigned* j, long long, const Spring& spring)
+            __attribute__((always_inline)) {
+        const Vec d = neighbours_of(where + 4 * at.base, j) - a;
+        const Vec u = damped ? neighbours_of(rates + 4 * at.root, j) - own_rate : Vec{};
+        const Pull found = special_pull(d, u, damped, spring, now);
+        sum.f = sum.f + scaled(d, found.pull);
+        if (LEDGER) sum.power += found.power * scalar(0.5);
+        if (LEDGER) sum.dash_power += found.dash_power * scalar(0.5);
+    });
+    return sum;
+};
+auto gather = [&](Slot at, const scalar* where, Vec a, scalar sine, scalar cosine,
+                  const scalar* rates) __attribute__((always_inline)) -> Force {
+    if (SPECIAL) return gather_special(at, where, a, sine, cosine, rates);
     const real si = zero + sine, co = zero + cosine;
     const real omega = zero + (LEDGER ? scalar(model.omegas.data[at.robot]) : scalar(0));
     Force sum = {};
@@ -83,7 +111,7 @@ auto outer_force = [&](Slot at, Vec x) __attribute__((always_inline)) -> Vec {
         for (int l = 0; l < W; ++l)
             set_lane(part, l, acting_part(window[l], window[SLICE + l]));
         if (!any(part > zero)) continue;
-        const real* const o = in_slice(model.outer_values.data, Slot{row, at.lane, 0, 0, 0}, 6);
+        const real* const o = in_slice(model.outer_values.data, Slot{row, at.lane, 0, 0, 0, 0}, 6);
         const Vec f = {o[0], o[STRIDE], o[2 * STRIDE]};
         const Vec pull = tether_force(f - x, o[3 * STRIDE], o[4 * STRIDE]);
         sum = sum + scaled(pick(o[5 * STRIDE] > zero, pull, f), part);
@@ -114,10 +142,19 @@ auto trouble = [=](Slot at, const scalar* where, Vec low, Vec v)
     const real reach2 = zero + model.reaches2.data[at.robot];
     const mask fast = too_fast(v, a - load(state.good_positions.data, at));
     mask stretched = zero > zero;
-    each_spring(at, where, [&](Vec b, real, real, real, real) __attribute__((always_inline)) {
+    auto is_far = [=](Vec b) __attribute__((always_inline)) -> mask {
         const Vec d = b - a;
-        stretched |= squared_length(d.x, d.y, d.z) > reach2;
-    });
+        return squared_length(d.x, d.y, d.z) > reach2;
+    };
+    if (SPECIAL)
+        each_end(at, [&](const unsigned* j, long long, const Spring& spring)
+                __attribute__((always_inline)) {
+            stretched |= is_far(neighbours_of(where + 4 * at.base, j)) & is_whole(spring);
+        });
+    else
+        each_spring(at, where, [&](Vec b, real, real, real, real) __attribute__((always_inline)) {
+            stretched |= is_far(b);
+        });
     bool deep = GROUND && any(in_world(sum_of(&a, &low, 0)).z < -depth_limit);
     if (OBSTACLES) deep = any((w > zero) & (depth_in_obstacles(a) > zero + depth_limit));
     return (deep ? 1 : 0) | (any(stretched) ? 2 : 0) | (any(fast) ? 4 : 0)
@@ -135,8 +172,8 @@ auto raise = [](int* flag, int bits) {
 #endif
 };
 // sin and cos of wt, from the turns that it makes: no argument is too large.
-auto oscillator = [=](int robot, long long n, scalar& sine, scalar& cosine) {
-    double turns = model.omegas.data[robot] * (double(n) * run.exact_dt) * 0.15915494309189535;
+auto wave_at = [=](double omega, long long n, scalar& sine, scalar& cosine) {
+    double turns = omega * (double(n) * run.exact_dt) * 0.15915494309189535;
     turns -= ::floor(turns);
 #if defined(__CUDA_ARCH__)
     sine = scalar(::sinpi(2.0 * turns)); cosine = scalar(::cospi(2.0 * turns));
@@ -144,6 +181,30 @@ auto oscillator = [=](int robot, long long n, scalar& sine, scalar& cosine) {
     sine = scalar(::sin(6.283185307179586 * turns));
     cosine = scalar(::cos(6.283185307179586 * turns));
 #endif
+};
+auto oscillator = [=](int robot, long long n, scalar& sine, scalar& cosine) {
+    wave_at(model.omegas.data[robot], n, sine, cosine);
+};
+// The oscillators of springs with a frequency of their own, at each end.
+auto set_ends = [=](Slot at, long long n) {
+    if (!ACTUATED || !OWN_OMEGAS) return;
+    each_end(at, [=](const unsigned*, long long, const Spring& spring) {
+        for (int l = 0; l < W; ++l) {
+            scalar sine, cosine;
+            wave_at(spring.omegas[l], n, sine, cosine);
+            set_lane(spring.turning[0], l, sine);
+            set_lane(spring.turning[1], l, cosine);
+        }
+    });
+};
+auto turn_ends = [=](Slot at) {
+    if (!ACTUATED || !OWN_OMEGAS) return;
+    each_end(at, [=](const unsigned*, long long, const Spring& spring) {
+        real* const o = spring.turning;
+        const real sine = o[0], cosine = o[1];
+        o[0] = sine * o[2] + cosine * o[3];
+        o[1] = cosine * o[2] - sine * o[3];
+    });
 };
 auto turn = [=](int robot, scalar& sine, scalar& cosine) {
     const scalar c = model.turns.data[2 * robot], s = model.turns.data[2 * robot + 1];
@@ -172,6 +233,51 @@ auto settle = [=](Slot at, bool stop, scalar* one, scalar* other, Vec& low, Sum&
     v = load_sum(state.good_velocities.data, state.good_low_velocities.data, at);
     close_accounts(state.ledgers.data, at, open_accounts(state.good_ledgers.data, at));
 };
+// Breaking and yielding, once a step, before its kicks.
+auto wear_slot = [&](Slot at, const scalar* where, scalar sine, scalar cosine) {
+    if (!LIMITS) return;
+    real w, loss = zero;
+    const Vec a = own_quad(where, at, w);
+    const Instant now = instant_of(at.robot, sine, cosine);
+    each_end(at, [&](const unsigned* j, long long end, const Spring& spring) {
+        const Vec d = neighbours_of(where + 4 * at.base, j) - a;
+        const Damage found = wear_spring(d, spring, now, w > zero);
+        loss += found.loss * scalar(0.5);
+        if (!any(found.breaks)) return;
+        for (int l = 0; l < W; ++l)
+            if (lane_of(select(found.breaks, zero + scalar(1), zero), l) > scalar(0))
+                state.broken_at.data[end + l] = instant;
+    });
+    if (!LEDGER) return;
+    Accounts accounts = open_accounts(state.ledgers.data, at);
+    accounts.values[6] += loss;
+    close_accounts(state.ledgers.data, at, accounts);
+};
+// What the dashpots see: velocities as a kick begins, then, by the midpoint rule, in its middle, as
+// forces at the former make them. Between the two all must have met. For `now`, `then` and
+// `shifted` see move_slot.
+auto rate_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, Sum v, bool shifted,
+                     bool start) {
+    real w;
+    const Vec here = own_quad(now, at, w), high = shifted ? own_quad(then, at, w) : here;
+    Losses losses = {};
+    if (!start) {
+        const Vec place = in_world(sum_of(&high, &low, 0));
+        lose_before(v, place, w, own_of(at, here, nullptr), losses);
+    }
+    keep_quad(state.rates.data, among_all(at), v, w);
+};
+auto middle_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, scalar sine,
+                       scalar cosine, scalar time, bool shifted) {
+    real w;
+    const Vec here = own_quad(now, at, w), high = shifted ? own_quad(then, at, w) : here;
+    const Force sum = gather(at, now, here, sine, cosine, state.rates.data);
+    const Vec place = in_world(sum_of(&high, &low, 0));
+    const Vec a = kick_acceleration(sum.f, place, w, own_of(at, here, nullptr));
+    const Vec rate = own_quad(state.rates.data, among_all(at), w);
+    keep_quad(state.middle_rates.data, among_all(at), rate + scaled(a, zero + time * scalar(0.5)),
+              w);
+};
 // One kick by the springs and its drift, from the positions `now` into the buffer `then`, which
 // holds the positions if the springs pull where the gradient kick looks.
 // `rest` is what each surface leaves over for friction, from one drift of a step to the next.
@@ -180,12 +286,14 @@ auto move_slot = [&](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v,
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
-    const Force sum = gather(at, now, here, sine, cosine);
+    const scalar* const rates = EULER ? state.rates.data : state.middle_rates.data;
+    const Force sum = gather(at, now, here, sine, cosine, DASHPOTS ? rates : nullptr);
     const Vec high = shifted ? own_quad(then, at, w) : here;
     Sum a = sum_of(&high, &low, 0);
     const Sum x_before = a, v_before = v;
     Accounts accounts = open_accounts(state.ledgers.data, at);
-    if (LEDGER && ACTUATED && !shifted) accounts.values[0] += sum.power * time;
+    if (LEDGER && (ACTUATED || TIMETABLE) && !shifted) accounts.values[0] += sum.power * time;
+    if (LEDGER && DASHPOTS) accounts.values[5] += sum.dash_power * time;
     const Own own = own_of(at, here, rest);
     if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values, own);
     else {
@@ -205,8 +313,8 @@ auto shift_slot = [&](Slot at, const scalar* now, scalar* then, Vec low, scalar 
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
-    const Force sum = gather(at, now, here, sine, cosine);
-    if (LEDGER && ACTUATED) {
+    const Force sum = gather(at, now, here, sine, cosine, nullptr);
+    if (LEDGER && (ACTUATED || TIMETABLE)) {
         Accounts accounts = open_accounts(state.ledgers.data, at);
         accounts.values[0] += sum.power * GRADIENT_KICK;
         close_accounts(state.ledgers.data, at, accounts);

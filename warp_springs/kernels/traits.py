@@ -38,6 +38,18 @@ class Traits:
     colliding: bool = False
 
     @property
+    def special(self) -> bool:
+        """Whether springs have more to them than k and L0."""
+        some = (self.harmonics, self.own_omegas, self.curved, self.dashpots)
+        return any((*some, self.limits, self.timetable))
+
+    def columns(self, actuated: bool) -> int:
+        """Coefficients of a spring, see ``kernels.springs``."""
+        curve = 2 + 2 * self.hinges if self.curved else 0
+        plain = 4 if actuated else 2
+        return plain + 2 * self.harmonics + curve + int(self.dashpots) + 2 * int(self.limits)
+
+    @property
     def name(self) -> str:
         """What is present, in short: part of the name of a module."""
         present = [(field.name, getattr(self, field.name)) for field in fields(self)]
