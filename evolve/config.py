@@ -188,7 +188,9 @@ class RunConfig(configs.Section):
     generations: int = Field(60, ge=1)
     """How many, at most."""
     budget: BudgetConfig = BudgetConfig()
-    body: configs.AnyBody
+    body: configs.AnyBody | None = None
+    """The body that is controlled, or from which evolving bodies descend; encodings that make
+    bodies from nothing have none."""
     encoding: AnyEncoding
     optimizer: AnyOptimizer
     scene: SceneConfig = SceneConfig()
@@ -212,6 +214,15 @@ class RunConfig(configs.Section):
             _known_measure(name)
         return self
 
+    @model_validator(mode="after")
+    def _has_the_body_it_needs(self) -> RunConfig:
+        needs, name = ENCODINGS[self.encoding.type].needs_body, self.encoding.type
+        if needs and self.body is None:
+            raise ValueError(f"body: the encoding {name} needs one; add a table [body]")
+        if not needs and self.body is not None:
+            raise ValueError(f"body: the encoding {name} makes its own bodies; remove [body]")
+        return self
+
     @property
     def descriptors(self) -> tuple[str, ...]:
         """Names of what is recorded of every robot beside its fitness."""
@@ -224,8 +235,9 @@ class RunConfig(configs.Section):
         return ENCODINGS[self.encoding.type].fixed_body
 
     def make_encoding(self) -> Encoding:
-        """Make the encoding over the configured body."""
-        return ENCODINGS[self.encoding.type](self.body.build(), self.encoding)
+        """Make the encoding, over the configured body if there is one."""
+        body = None if self.body is None else self.body.build()
+        return ENCODINGS[self.encoding.type](body, self.encoding)
 
     def make_optimizer(self, encoding: Encoding) -> Optimizer:
         """Make the optimizer at its very start."""

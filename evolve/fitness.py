@@ -136,6 +136,20 @@ def forward(trial: Trial) -> np.ndarray:
     return _per_diameter_and_cycle(along, trial)
 
 
+@measure("body diameters per cycle", path=True)
+def steady(trial: Trial) -> np.ndarray:
+    """Speed in the slower half of the measurement: who falls over once does not fall again.
+
+    As `speed`, of twice the shorter of the two ways in the two halves; way that the second half
+    takes back does not count.
+    """
+    path = trial.path[:, :, :2]
+    middle = path.shape[1] // 2
+    ways = [path[:, middle] - path[:, 0], path[:, -1] - path[:, middle]]
+    halves = np.minimum(*(np.linalg.norm(way, axis=1) for way in ways))
+    return _per_diameter_and_cycle(np.minimum(2.0 * halves, distance(trial)), trial)
+
+
 @measure("m")
 def distance(trial: Trial) -> np.ndarray:
     """Net distance of the centre of mass over the ground, straight from start to end."""
@@ -216,6 +230,43 @@ def diameter(trial: Trial) -> np.ndarray:
 def springs(trial: Trial) -> np.ndarray:
     """Number of springs of the body."""
     return np.array([float(robot.n_springs) for robot in trial.robots])
+
+
+@measure("springs")
+def muscles(trial: Trial) -> np.ndarray:
+    """Number of springs of the body that breathe."""
+    return np.array([float(np.count_nonzero(robot.amplitude)) for robot in trial.robots])
+
+
+@measure("")
+def symmetry(trial: Trial) -> np.ndarray:
+    """How far the body is its own mirror image, left and right or front and back: 1 is wholly.
+
+    One minus twice the mean distance from the mirror image of a mass, in the plane through the
+    centre of mass across x or across y, to the nearest mass, in body diameters; the better plane
+    counts.
+    """
+    return np.array([_symmetry(robot) for robot in trial.robots])
+
+
+@measure("", path=True)
+def footfall(trial: Trial) -> np.ndarray:
+    """Share of the sampled instants at which some mass touches the ground z = 0."""
+    lowest = [
+        [piece.positions(i)[:, 2].min() for i in range(len(trial.robots))] for piece in trial.pieces
+    ]
+    return (np.array(lowest) <= 0.0).mean(axis=0)
+
+
+def _symmetry(robot: ws.Robot) -> float:
+    places = robot.positions - robot.center_of_mass
+    found = [0.0]
+    for axis in (0, 1):
+        image = places.copy()
+        image[:, axis] *= -1.0
+        gap = np.linalg.norm(image[:, None] - places[None], axis=2).min(axis=1).mean()
+        found.append(1.0 - 2.0 * float(gap) / max(robot.diameter, 1e-12))
+    return max(found)
 
 
 def omegas(robots: Sequence[ws.Robot]) -> np.ndarray:

@@ -15,6 +15,7 @@ from evolve.encodings.fourier import FourierEncoding, FourierSettings
 from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
 from evolve.encodings.neural import NeuralEncoding, NeuralSettings
 from evolve.encodings.regions import RegionsEncoding, RegionsSettings
+from evolve.encodings.voxels import VoxelsEncoding, VoxelsSettings
 
 __all__ = [
     "ENCODINGS",
@@ -37,6 +38,8 @@ __all__ = [
     "NeuralSettings",
     "RegionsEncoding",
     "RegionsSettings",
+    "VoxelsEncoding",
+    "VoxelsSettings",
 ]
 
 ENCODINGS: dict[str, type[Encoding]] = {
@@ -47,5 +50,6 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "expression": ExpressionEncoding,
     "neural": NeuralEncoding,
     "cppn": CppnEncoding,
+    "voxels": VoxelsEncoding,
 }
 """Name in the configuration -> class."""

@@ -60,6 +60,7 @@ class FixedBody:
     """
 
     fixed_body: ClassVar[bool] = True
+    needs_body: ClassVar[bool] = True
 
     def __init__(self, body: ws.Robot, settings: ActuationSettings) -> None:
         if body.n_springs == 0:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes", "folded"]
+__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes", "ListGenomes", "folded"]
 
 Genomes = Any
 """A population of genomes. Only its encoding looks inside; everybody else may call `len`."""
@@ -37,8 +37,10 @@ class Encoding(Protocol):
     """The part of a run's configuration that belongs to this encoding."""
     fixed_body: ClassVar[bool]
     """Whether all robots share the topology of one given body."""
+    needs_body: ClassVar[bool]
+    """Whether it is made over a given body; otherwise `body` is None."""
 
-    def __init__(self, body: ws.Robot, settings: EncodingSettings) -> None: ...
+    def __init__(self, body: ws.Robot | None, settings: EncodingSettings) -> None: ...
 
     def random(self, n: int, rng: np.random.Generator) -> Genomes:
         """Make n unrelated genomes."""
@@ -116,3 +118,15 @@ class ArrayGenomes:
                 )
         genes = np.frombuffer(b"".join(blobs), dtype="<f4").astype(np.float32)
         return genes.reshape(len(blobs), *self.genome_shape)
+
+
+class ListGenomes:
+    """The housekeeping of encodings whose population is a list of immutable genomes."""
+
+    def take(self, genomes: Sequence[Any], indices: np.ndarray) -> list[Any]:
+        """The genomes at `indices`, in that order."""
+        return [genomes[i] for i in indices]
+
+    def concatenate(self, parts: Sequence[Sequence[Any]]) -> list[Any]:
+        """One population from several."""
+        return [genome for part in parts for genome in part]

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from evolve.encodings.actuation import ActuationSettings, FixedBody
-from evolve.encodings.base import EncodingSettings
+from evolve.encodings.base import EncodingSettings, ListGenomes
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -62,7 +62,7 @@ class ExpressionSettings(ActuationSettings):
     """How many harmonics of the formula's course in time the springs follow."""
 
 
-class ExpressionEncoding(FixedBody):
+class ExpressionEncoding(FixedBody, ListGenomes):
     """L0 = L (1 + amplitude tanh f(x, y, z, sin wt, cos wt)), k from tanh g(x, y, z).
 
     Trees are varied by `deap.gp` and evaluated as flat lists on a stack, for all springs and
@@ -194,14 +194,6 @@ class ExpressionEncoding(FixedBody):
                 raise ValueError(f"genome {i} has {len(blob)} bytes, {at} expected")
             genomes.append(Formulas(length, stiffness))
         return genomes
-
-    def take(self, genomes: Sequence[Formulas], indices: np.ndarray) -> list[Formulas]:
-        """The genomes at `indices`, in that order."""
-        return [genomes[i] for i in indices]
-
-    def concatenate(self, parts: Sequence[Sequence[Formulas]]) -> list[Formulas]:
-        """One population from several."""
-        return [genome for part in parts for genome in part]
 
 
 # Trees of deap.gp, whose nodes name themselves by CODES.

@@ -77,14 +77,21 @@ def demotions(finalists: Sequence[Finalist]) -> str:
     )
 
 
+def _body(config: RunConfig) -> str:
+    """What the body is, or of what kind the bodies are."""
+    if config.body is None:
+        return f"every robot has its own, made by its genome ({config.encoding.type})"
+    body = config.body.build()
+    words = (
+        f"{config.body.shape}: {body.n_masses} masses, {body.n_springs} springs, "
+        f"{body.mass:g} kg, diameter {body.diameter:.3g} m"
+    )
+    return words if config.fixed_body else f"every robot has its own, descended from a {words}"
+
+
 def describe(config: RunConfig) -> Iterator[tuple[str, str]]:
     """What a run does, in a few lines: (subject, words)."""
-    body = config.body.build()
-    yield (
-        "body",
-        f"{config.body.shape}: {body.n_masses} masses, {body.n_springs} springs, "
-        f"{body.mass:g} kg, diameter {body.diameter:.3g} m",
-    )
+    yield "body", _body(config)
     yield (
         "search",
         f"{config.optimizer.type} over {config.encoding.type} genomes, "

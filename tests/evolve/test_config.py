@@ -19,14 +19,21 @@ def test_every_preset_is_complete_and_survives_being_written(name):
     config = load(name)
     assert config.name == name and config.about and "\n" not in config.about
     assert parse(dump(config), "copy") == config
-    body = config.body.build()
-    assert body.bounds[0, 2] == 0.0, "it stands on the ground"
-    assert config.make_encoding().random(2, np.random.Generator(np.random.Philox(1))) is not None
+    encoding = config.make_encoding()
+    for robot in encoding.express(encoding.random(2, np.random.Generator(np.random.Philox(1)))):
+        assert robot.bounds[0, 2] == 0.0, "it stands on the ground"
 
 
 def test_the_presets_are_there():
     wanted = {"walker", "cube", "octahedron", "worm", "starfish", "tripod", "blob"}
     assert wanted <= set(preset_names())
+
+
+def test_a_body_is_there_exactly_where_an_encoding_needs_one():
+    with pytest.raises(ConfigError, match="body: the encoding direct needs one"):
+        load("critter", {"encoding.type": "direct"})
+    with pytest.raises(ConfigError, match="body: the encoding voxels makes its own bodies"):
+        load("critter", {"body.shape": "cube"})
 
 
 @given(
@@ -54,7 +61,8 @@ def test_every_optimizer_can_be_chosen_by_its_name(name):
 
 @pytest.mark.parametrize("name", ENCODINGS)
 def test_every_encoding_can_be_chosen_by_its_name(name):
-    assert isinstance(load("cube", {"encoding.type": name}).make_encoding(), ENCODINGS[name])
+    preset = "cube" if ENCODINGS[name].needs_body else "critter"
+    assert isinstance(load(preset, {"encoding.type": name}).make_encoding(), ENCODINGS[name])
 
 
 SHAPES = [

@@ -1,0 +1,44 @@
+"""What encodings of evolving bodies share: limits that are the same for all, fair and safe."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field, field_validator
+
+from evolve.encodings.base import EncodingSettings
+
+__all__ = ["BodySettings", "EvolvingBody"]
+
+
+class BodySettings(EncodingSettings):
+    """What evolved bodies may weigh, measure and do; the same for every encoding of bodies."""
+
+    mass: float = Field(4.0, gt=0.0)
+    """Mass of every robot, however many points it has [kg]."""
+    largest_extent: float = Field(1.0, gt=0.0)
+    """Longest side of the bounding box that a body may have [m]."""
+    most_masses: int = Field(64, ge=4)
+    """Points that a body may have."""
+    most_springs: int = Field(400, ge=6)
+    """Springs that a body may have."""
+    rest_length: tuple[float, float] = (0.9, 1.1)
+    """Lowest and highest mean rest length, in initial lengths of the spring."""
+    amplitude: float = Field(0.2, ge=0.0, lt=1.0)
+    """Largest amplitude of the rest length, in initial lengths of the spring."""
+    stiffness: tuple[float, float] = (1000.0, 20000.0)
+    """Lowest and highest stiffness [N/m]; genes are its logarithm."""
+
+    @field_validator("rest_length", "stiffness")
+    @classmethod
+    def _ordered(cls, bounds: tuple[float, float]) -> tuple[float, float]:
+        if not 0.0 < bounds[0] <= bounds[1] < float("inf"):
+            raise ValueError("expected two finite numbers with 0 < lowest <= highest")
+        return bounds
+
+
+class EvolvingBody:
+    """Every robot has a body of its own."""
+
+    fixed_body: ClassVar[bool] = False
+    needs_body: ClassVar[bool] = False
