@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 __all__ = ["ActuationSettings", "FixedBody"]
 
 AXES = {"x": 0, "y": 1}
+OWN = ("rest_length", "amplitude", "phase", "stiffness", "material")
+"""Fields that a body has too."""
 
 
 class ActuationSettings(EncodingSettings):
@@ -29,6 +31,8 @@ class ActuationSettings(EncodingSettings):
     """Largest amplitude of the rest length, in initial lengths of the spring."""
     stiffness: tuple[float, float] = (1000.0, 20000.0)
     """Lowest and highest stiffness [N/m]; genes are its logarithm."""
+    muscles: Literal["all", "cables"] = "all"
+    """Which springs have genes; the others stay as the body has them."""
     symmetry: Literal["none", "x", "y"] = "none"
     """Axis along which the two halves of the body mirror each other and share their genes."""
     symmetry_phase: float = 0.5
@@ -70,11 +74,13 @@ class FixedBody:
         if settings.symmetry != "none":
             partner = mirror_images(body, AXES[settings.symmetry])
         middles = body.positions[body.springs].mean(axis=1)
+        self._passive = np.flatnonzero(~muscles(body, settings.muscles))
         first = partner >= np.arange(body.n_springs)  # of a pair, the one that is listed first
-        self.own = np.flatnonzero(first)
-        row = np.cumsum(first) - 1
-        self._row = np.where(first, row, row[partner])
         self._later = np.where(first, 0.0, settings.symmetry_phase)
+        own = first & muscles(body, settings.muscles)
+        self.own = np.flatnonzero(own)
+        row = np.maximum(np.cumsum(own) - 1, 0)  # what passive springs look up is not used
+        self._row = np.where(first, row, row[partner])
         self.middles = middles[self.own]
         low, high = body.bounds
         half = max(float((high - low).max()) / 2.0, np.finfo(float).tiny)
@@ -99,7 +105,7 @@ class FixedBody:
         """
         settings, lengths = self.settings, self.body.lengths
         (low, high), (soft, hard) = settings.rest_length, settings.stiffness
-        return self.body.variants(
+        return self.variants(
             rest_length=lengths * (low + (high - low) * self.spread(rest)),
             amplitude=lengths * (settings.amplitude * self.spread(amplitude)),
             phase=2.0 * np.pi * self.spread_phase(phase),
@@ -107,6 +113,15 @@ class FixedBody:
             omega=np.full(len(rest), 2.0 * np.pi / settings.period),
             **more,
         )
+
+    def variants(self, **fields: np.ndarray) -> ws.Variants:
+        """The robots of fields of `ws.Variants`, whose passive springs are those of the body."""
+        passive = self._passive
+        for name, value in fields.items() if len(passive) else ():
+            if name != "omega":
+                value = fields[name] = np.array(value)
+                value[:, passive] = getattr(self.body, name)[passive] if name in OWN else 0.0
+        return self.body.variants(**fields)
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Values of the springs that have genes, (n, R, ...), for every spring, (n, S, ...)."""
@@ -141,6 +156,20 @@ class FixedBody:
             gap *= normals[:, i, None]
             offsets += gap
         return offsets > 0.0
+
+
+def muscles(body: ws.Robot, which: str) -> np.ndarray:
+    """Which springs are muscles, shape (S,), bool.
+
+    Raises:
+        ValueError: The body has none.
+    """
+    if which == "all":
+        return np.ones(body.n_springs, bool)
+    slope = body.elements.slope
+    if slope is None or not (slope == 0.0).any():
+        raise ValueError("muscles: the body has no cables")
+    return slope == 0.0
 
 
 def mirror_images(body: ws.Robot, axis: int) -> np.ndarray:

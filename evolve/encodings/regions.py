@@ -117,7 +117,7 @@ class RegionsEncoding(FixedBody, ArrayGenomes):
         chosen = self.spread(self.chosen(genomes))
         springs, lengths = np.arange(self.body.n_springs), self.body.lengths
         later = self.spread_phase(np.zeros((1, len(self.own))))
-        return self.body.variants(
+        return self.variants(
             stiffness=self._stiffness[chosen, springs],
             rest_length=np.broadcast_to(lengths, chosen.shape),
             amplitude=lengths * self._strain[chosen],

@@ -150,6 +150,28 @@ def test_mirrored_springs_do_the_same_half_a_cycle_later(name):
 
 
 @pytest.mark.parametrize("name", FIXED)
+def test_springs_that_are_no_muscles_stay_as_the_body_has_them(name):
+    body = ws.shapes.snake(3)
+    cables = body.elements.slope == 0.0
+    encoding = make(name, body, muscles="cables", symmetry="y")
+    assert set(encoding.own) < set(np.flatnonzero(cables))
+    robots = encoding.express(genomes_of(encoding, 3, 4))
+    for robot in robots:
+        for field in ("rest_length", "amplitude", "phase", "stiffness"):
+            mine, its = getattr(robot, field), getattr(body, field)
+            np.testing.assert_array_equal(mine[~cables], its[~cables])
+        if robot.elements.harmonics is not None:
+            assert not robot.elements.harmonics[~cables].any()
+        assert robot.elements.slope.tolist() == body.elements.slope.tolist()
+    assert (robots[0].stiffness[cables] != body.stiffness[cables]).any()
+
+
+def test_a_body_without_cables_is_refused():
+    with pytest.raises(ValueError, match="muscles: the body has no cables"):
+        make("direct", muscles="cables")
+
+
+@pytest.mark.parametrize("name", FIXED)
 def test_a_run_changes_its_encoding_by_one_word(name):
     """And finds a faster robot than any of the first generation."""
     changes = {"encoding.type": name, "population": 48, "generations": 12, "task.measure": 2.0}

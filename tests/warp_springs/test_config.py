@@ -312,7 +312,7 @@ def test_the_reference_explains_every_key():
     headings = [line for line in lines if line.startswith("[")]
     for table in ("[robot.body]", "[[robot.materials]]", "[scene.ground]", "[record]"):
         assert table in headings
-    assert headings.count("[robot.body]") == 11
+    assert headings.count("[robot.body]") == 12
 
 
 def test_the_command_prints_the_reference(capsys):

@@ -156,6 +156,20 @@ def test_a_ball_bounces_straight_up():
     assert result.center_of_mass[0, :2] == pytest.approx([0, 0], abs=1e-9)
 
 
+def test_snake():
+    snake = shapes.snake(segments=5, edge=0.2, span=3, mass=3.0, stiffness=7.0, cable=9.0)
+    assert snake.bounds.tolist() == [[0, 0, 0], [pytest.approx(1.0), 0.2, 0.2]]
+    assert snake.mass == pytest.approx(3.0)
+    cables = snake.elements.slope == 0.0
+    assert cables.sum() == 4 * 3 and cables[-12:].all()
+    assert (snake.stiffness == np.where(cables, 9.0, 7.0)).all()
+    ends = snake.positions[snake.springs[cables]]
+    np.testing.assert_allclose(ends[:, 1] - ends[:, 0], [[0.6, 0.0, 0.0]] * 12, atol=1e-12)
+    assert len(np.unique(ends[:, 0, 1:].round(6), axis=0)) == 4, "one row along each long edge"
+    with pytest.raises(ValueError, match="span: got 6, expected at most segments = 5"):
+        shapes.snake(segments=5, span=6)
+
+
 def test_beam():
     beam = shapes.beam(2.0, 0.3, 0.1, cells=(8, 2, 1), mass=4.0, stiffness=9.0)
     assert beam.bounds.tolist() == [[0, 0, 0], [2.0, pytest.approx(0.3), 0.1]]

@@ -143,6 +143,22 @@ class Chain(BodyConfig):
     """Of the whole chain [kg]."""
 
 
+class Snake(BodyConfig):
+    """A row of cubes along x that cables pull together along its four long edges."""
+
+    shape: Literal["snake"]
+    segments: int = Field(8, ge=1)
+    """Number of cubes."""
+    edge: float = Field(0.1, gt=0.0)
+    """Of a cube [m]."""
+    span: int = Field(2, ge=1)
+    """Cubes between the ends of a cable."""
+    mass: float = Field(2.0, gt=0.0)
+    """Of the whole body [kg]."""
+    cable: float = Field(2000.0, gt=0.0)
+    """Stiffness of the cables [N/m]."""
+
+
 class Sphere(BodyConfig):
     """A solid ball."""
 
@@ -221,7 +237,7 @@ class SavedConfig(Section):
         return Robot.load(self.path)
 
 
-SHAPES = (Cube, Tetrahedron, Octahedron, Lattice, Voxels, Beam, Chain, Sphere, RandomLattice)
+SHAPES = (Cube, Tetrahedron, Octahedron, Lattice, Voxels, Beam, Chain, Snake, Sphere, RandomLattice)
 """The bodies that need no file."""
 AnyShape = one_of(SHAPES, "shape")
 AnyBody = one_of((*SHAPES, MeshConfig, SavedConfig), "shape")

@@ -5,7 +5,7 @@ All are at rest and not actuated, and their springs have their initial lengths.
 
 from warp_springs.shapes.convex import octahedron, tetrahedron
 from warp_springs.shapes.filled import filled, sphere
-from warp_springs.shapes.rods import beam, chain
+from warp_springs.shapes.rods import beam, chain, snake
 from warp_springs.shapes.scattered import random_lattice
 from warp_springs.shapes.voxels import cube, lattice, voxels
 
@@ -17,6 +17,7 @@ __all__ = [
     "lattice",
     "octahedron",
     "random_lattice",
+    "snake",
     "sphere",
     "tetrahedron",
     "voxels",
