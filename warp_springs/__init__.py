@@ -10,7 +10,8 @@ ws.export_usd(result, "cube.usdc")
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
-from warp_springs import materials, shapes
+from warp_springs import materials, sensors, shapes
+from warp_springs.body.control import Controller
 from warp_springs.body.elements import Elements, Push, Tether, Timetable
 from warp_springs.body.variants import Variants
 from warp_springs.body.waveform import Waveform
@@ -29,6 +30,7 @@ __all__ = [
     "Camera",
     "Circle",
     "Collisions",
+    "Controller",
     "Document",
     "Elements",
     "Energy",
@@ -63,6 +65,7 @@ __all__ = [
     "quiet",
     "read_mesh",
     "render",
+    "sensors",
     "shapes",
     "stable_dt",
     "write_mesh",

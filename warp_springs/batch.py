@@ -156,6 +156,8 @@ class Batch:
         levels: Halvings of the step of the run for each robot, shape (N,).
         wearing: For each robot whose springs may break, where they are in the buffer of the times
             when they broke, shape (S,), and its lane.
+        columns: Coefficients of a spring of each robot, shape (N,).
+        robots: The robots.
         rounding: Energy that rounding alone may give each robot [J], shape (N,).
     """
 
@@ -168,7 +170,7 @@ class Batch:
         bodies: Mapping[int, np.ndarray] | None = None,
     ) -> None:
         refuse_unsupported(robots, scene, method.precision)
-        self._robots, self._bodies = robots, bodies or {}
+        self.robots, self._bodies = robots, bodies or {}
         self._scene, self._method, self._layout_of = scene, method, layout_of
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
@@ -179,6 +181,7 @@ class Batch:
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
+        self.columns = np.zeros(len(robots), np.int64)
 
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -303,6 +306,7 @@ class Batch:
         if strip.elements is not NONE:
             elements = element_buffers(strip.fields, order, method.spans(levels))
             table = np.concatenate([table, spring_columns(strip.fields, order)], axis=1)
+        self.columns[strip.ids] = table.shape[1]
         self._tables.append(self._describe(strip, width, table.shape[1], elements))
         self._append("rows", row)
         self._append("partners", partner)
@@ -338,7 +342,7 @@ class Batch:
             self._append(name, lane_major(cast, n, width))
         self._pack_elements(strip, width, elements, order, row)
         if self._scene.collisions is not None:
-            robot = self._robots[int(strip.ids[0])]
+            robot = self.robots[int(strip.ids[0])]
             bodies = self._bodies.get(int(strip.ids[0]), np.zeros(robot.n_masses, np.int32))
             for name, values in collision_buffers(robot, bodies, self._scene.collisions).items():
                 self._append(name, values.astype(dtype_of(name, method.precision)))
@@ -418,7 +422,7 @@ class Batch:
         table |= {"masses": masses, "springs": counts}
         counts = element_counts(strip.elements)
         if self._scene.collisions is not None:
-            counts |= collision_counts(self._robots[int(strip.ids[0])])
+            counts |= collision_counts(self.robots[int(strip.ids[0])])
         else:
             counts |= dict.fromkeys(("triangles", "edges", "capacity"), 0)
         for column, count in counts.items():

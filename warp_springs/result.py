@@ -67,6 +67,7 @@ class Result:
     _velocities: np.ndarray = field(repr=False)
     _frames: Mapping[int, np.ndarray] = field(repr=False)
     _worn: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
+    _signals: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         """Number of robots N."""
@@ -127,6 +128,13 @@ class Result:
     def yielded(self, robot: int) -> np.ndarray:
         """How much longer each spring's rest length became by yielding [m], shape (S,)."""
         return self._wear(robot)[1]
+
+    def signals(self, robot: int) -> np.ndarray:
+        """Outputs of a robot's controllers that its muscles obey at the end, shape (outputs,).
+
+        Those of all its controllers, one after the other; from -1 to 1, empty without any.
+        """
+        return self._signals.get(self._index(robot), np.zeros(0))
 
     def _wear(self, robot: int) -> np.ndarray:
         robot = self._index(robot)

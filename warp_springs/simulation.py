@@ -14,6 +14,7 @@ from warp_springs.batch import Batch
 from warp_springs.body.variants import Variants
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
+from warp_springs.engine.control import pilots
 from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.engine.method import AUTO_DT, Method
 from warp_springs.engine.packing import aligned
@@ -121,6 +122,8 @@ class Simulation:
         self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)
+        constants = self._buffers["constants"]
+        self._pilots = pilots(self._slices, self._batch, self.scene, constants, self.dt)
 
     def _gather(self, world: str | Sequence[int]) -> dict[int, np.ndarray]:
         """Put the robots into their worlds; the body of each mass of a world of several."""
@@ -188,7 +191,13 @@ class Simulation:
         self._buffers["ledgers"][:] = 0.0
         for piece in self._slices:
             piece.prepare(ledger=energy)
-        tapes = [Tape(s, self._batch.slots, recorded, frame_steps, energy) for s in self._slices]
+        for pilot in self._pilots:
+            if pilot is not None:
+                pilot.open(ledger=energy)
+        tapes = [
+            Tape(piece, self._batch.slots, recorded, frame_steps, energy, pilot)
+            for piece, pilot in zip(self._slices, self._pilots, strict=True)
+        ]
 
         started = time.perf_counter()
         self._underway = (first, recorded, tapes, started)
@@ -316,6 +325,7 @@ class Simulation:
             wall_time=wall_time,
             _slots=slots,
             _worn=self._worn(),
+            _signals={i: s for p in self._pilots if p is not None for i, s in p.signals().items()},
             _positions=buffers["seen_positions"].copy(),
             _velocities=buffers["seen_velocities"].copy(),
             _frames={i: f for tape in tapes for i, f in tape.frames_by_robot().items()},

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_springs.body.bonds import Bonds
+from warp_springs.body.control import Controller
 from warp_springs.geometry import FloatArray
 
 __all__ = ["NEUTRAL", "NONE", "PER_MASS", "PER_SPRING", "Elements", "Push", "Tether", "Timetable"]
@@ -124,6 +125,7 @@ class Elements:
         pushes: Forces in windows of time.
         tethers: Temporary springs to points.
         bonds: Masses that are fixed or held to a plane, a line, a circle or a sphere.
+        controllers: Closed loops that set rest lengths; see `Robot.controlled`.
     """
 
     harmonics: FloatArray | None = None
@@ -139,6 +141,7 @@ class Elements:
     pushes: tuple[Push, ...] = ()
     tethers: tuple[Tether, ...] = ()
     bonds: Bonds = field(default_factory=Bonds)
+    controllers: tuple[Controller, ...] = ()
 
     @property
     def arrays(self) -> dict[str, FloatArray]:
@@ -158,6 +161,8 @@ class Elements:
         table = self.timetable
         if table is not None and table.factors.shape[0] != springs:
             raise ValueError(f"timetable: {len(table.factors)} springs given, {springs} expected")
+        for controller in self.controllers:
+            controller.check(masses, springs)
         used = [i for push in self.pushes for i in push.masses] + [t.mass for t in self.tethers]
         used += self.bonds.masses.tolist()
         for index in used:
@@ -181,7 +186,7 @@ class Elements:
         table = self.timetable
         timed = () if table is None else (table.times, table.factors, table.offsets)
         arrays = (*self.arrays.items(), *enumerate(timed), *enumerate(self.bonds.arrays))
-        lists = (self.pushes, self.tethers, table.period if table else None)
+        lists = (self.pushes, self.tethers, self.controllers, table.period if table else None)
         return (*((name, value.shape, (value + 0.0).tobytes()) for name, value in arrays), lists)
 
     def __eq__(self, other: object) -> bool:
@@ -327,7 +332,19 @@ def join_elements(
     moved_tethers = [replace(t, mass=int(index[t.mass])) for t in second.tethers]
     changes["tethers"] = (*first.tethers, *moved_tethers)
     changes["bonds"] = first.bonds.joined(second.bonds.renamed(index))
+    changes["controllers"] = _joined_controllers(first, second, counts, index, **how)
     return Elements(**changes)
+
+
+def _joined_controllers(first, second, counts, index, keep, masses, fresh) -> tuple:
+    """The controllers of both, by the numbers of masses and springs in the whole."""
+    place = np.full(sum(counts), -1)
+    kept = np.arange(sum(counts))[keep]
+    place[kept] = np.arange(len(kept))
+    whole = masses + int(fresh.sum())
+    ours = [c.renamed(np.arange(masses), place[: counts[0]], whole) for c in first.controllers]
+    theirs = [c.renamed(index, place[counts[0] :], whole) for c in second.controllers]
+    return (*ours, *theirs)
 
 
 def _padded(name: str, first: Elements, second: Elements, counts: tuple[int, int]) -> list:

@@ -18,6 +18,8 @@ STACKABLE = tuple(name for name, field in FIELDS.items() if field.rule not in ("
 """The fields in which variants of one body may differ: all but springs, faces and materials."""
 ELEMENTS = (*PER_SPRING, *PER_MASS)
 """The arrays of its elements in which they may differ too."""
+WEIGHTS = "weights"
+"""Those of the network of its controller, likewise."""
 
 
 class Variants(Sequence[Robot]):
@@ -32,7 +34,8 @@ class Variants(Sequence[Robot]):
         stacked: Field name -> array with one row a robot on axis 0 and then the shape of the
             field: (N, M) masses, (N, M, 3) positions or velocities, (N, S) stiffness,
             rest_length, amplitude, phase or material, (N,) omega; or arrays of `ws.Elements`,
-            such as (N, S, H, 2) harmonics or (N, S) dashpot. At least one.
+            such as (N, S, H, 2) harmonics or (N, S) dashpot; or the (N, n_weights) weights of
+            its controller. At least one.
 
     Raises:
         TypeError: A field cannot be stacked.
@@ -48,13 +51,15 @@ class Variants(Sequence[Robot]):
         arrays: dict[str, NDArray[Any]] = {}
         count = None
         for name, value in stacked.items():
-            if name in ELEMENTS:
+            if name == WEIGHTS:
+                arrays[name] = _checked_weights(body, value, count)
+            elif name in ELEMENTS:
                 arrays[name] = _checked_element(body, name, value, count)
             elif name in STACKABLE:
                 shape = (count, *np.shape(getattr(body, name)))
                 arrays[name] = checked(name, value, shape, spread=False)
             else:
-                known = ", ".join((*STACKABLE, *ELEMENTS))
+                known = ", ".join((*STACKABLE, *ELEMENTS, WEIGHTS))
                 raise TypeError(f"variants cannot stack {name!r}, only {known}")
             count = len(arrays[name])
         if "material" in arrays:
@@ -110,6 +115,9 @@ class Variants(Sequence[Robot]):
             raise IndexError(f"robot {i} asked for, there are {self._count} variants")
         rows = {name: array[i] for name, array in self._stacked.items()}
         changed = {name: frozen(rows.pop(name)) for name in list(rows) if name in ELEMENTS}
+        if WEIGHTS in rows:
+            (controller,) = self._body.elements.controllers
+            changed["controllers"] = (controller.replace(weights=rows.pop(WEIGHTS)),)
         if changed:
             rows["elements"] = self._body.elements.replace(**changed)
         return self._body.replace(**rows)
@@ -122,6 +130,14 @@ class Variants(Sequence[Robot]):
 
     def __repr__(self) -> str:
         return f"Variants({self._count} of {self._body!r} in {', '.join(self._stacked)})"
+
+
+def _checked_weights(body: Robot, value: ArrayLike, count: int | None) -> NDArray[np.float64]:
+    controllers = body.elements.controllers
+    if len(controllers) != 1:
+        raise ValueError(f"weights: the body has {len(controllers)} controllers, 1 expected")
+    rows = len(value) if count is None else count
+    return controllers[0].checked(value, (rows,))
 
 
 def _checked_element(

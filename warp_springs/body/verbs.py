@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_springs.body.bonds import Bonds
+from warp_springs.body.control import Controller, body_frame
 from warp_springs.body.elements import (
     PER_SPRING,
     Elements,
@@ -185,6 +186,28 @@ class Verbs:
         Arguments as of `with_stiffness_in_time`. A winch that only pulls is a cable too.
         """
         return self._with_timetable("offsets", times, offsets, springs, period)
+
+    def controlled(self, controller: Controller) -> Robot:
+        """The robot with a closed loop: sensors, a network and the muscles that it drives.
+
+        Forward, left and up of the sensors are x, y and z of the robot as it is now; they turn with
+        it. A robot may have several controllers, for different muscles. Variants of it may differ
+        in ``weights`` (N, n_weights) if it has one.
+
+        Raises:
+            ValueError: The controller names masses or springs that the robot has not, or muscles
+                that another one drives.
+            TypeError: It is no `ws.Controller`.
+        """
+        if not isinstance(controller, Controller):
+            kind = type(controller).__name__
+            raise TypeError(f"controller: got {kind}, expected a Controller")
+        others = self.elements.controllers
+        taken = {i for other in others for i in other.muscles} & set(controller.muscles)
+        if taken:
+            raise ValueError(f"muscles: another controller drives spring {min(taken)}")
+        attached = controller.replace(frame=body_frame(self.masses, self.positions))
+        return self._with_elements(controllers=(*others, attached))
 
     # -- forces and constraints ---------------------------------------------------------------
 

@@ -10,7 +10,7 @@ import ctypes
 import functools
 import itertools
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 
@@ -18,7 +18,16 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group
-from warp_springs.engine.gathering import WEAR, Bodies, Lists, arrays, ranges, worn_springs
+from warp_springs.engine.control import Reach
+from warp_springs.engine.gathering import (
+    WEAR,
+    Bodies,
+    Lists,
+    arrays,
+    half_rest_places,
+    ranges,
+    worn_springs,
+)
 from warp_springs.engine.layouts import block_size
 from warp_springs.engine.packing import aligned
 from warp_springs.kernels.block import BLOCK, block
@@ -83,6 +92,7 @@ class Crowd:
 
     def __init__(self, group, first, last, batch, buffers, device, cores) -> None:
         self.first, self.last, self.buffers, self.device = first, last, buffers, device
+        self.place, self.precision = device, group.features.precision
         rows = batch.bundles[first:last]
         about = dict(zip(BUNDLE, rows[0], strict=True))
         self._division = int(about["division"])
@@ -155,6 +165,22 @@ class Crowd:
             "chunks": len(self._given["model"].chunks) // len(CHUNK),
             "robots": self._robots,
         }
+
+    def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
+        """Where controllers find some of its robots."""
+        slots, seen, cells = batch.slots, self._given["seen"], []
+        counts = batch.bundles[self.first : self.last, BUNDLE.index("springs")]
+        starts, every = np.cumsum(counts) - counts, half_rest_places(self._lists, self.features)
+        for robot in robots:
+            bundle = slots.bundle[robot] - self.first
+            cells.append(every[:, starts[bundle] : starts[bundle] + counts[bundle]])
+        chosen = np.array(robots)
+        place = slots.state[chosen] - self._seen_in["seen_positions"].start
+        lanes = slots.first_lane[chosen] - self._seen_in["seen_states"].start
+        views = {name: getattr(seen, f"seen_{name}") for name in ("positions", "velocities")}
+        views["states"] = seen.seen_states
+        table = np.stack([place, np.ones_like(place), lanes], axis=1)
+        return Reach(views, self._given["model"].coefficients, table, cells)
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all robots from ``first_step`` to ``last_step`` of the run."""

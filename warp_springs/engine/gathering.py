@@ -14,7 +14,7 @@ import numpy as np
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE
 from warp_springs.kernels.gather import GatherFeatures, lane_order
 
-__all__ = ["WEAR", "Bodies", "Lists", "arrays", "ranges", "worn_springs"]
+__all__ = ["WEAR", "Bodies", "Lists", "arrays", "half_rest_places", "ranges", "worn_springs"]
 
 #: Masses that are sorted by their number of springs, so that the lists of a slice are of about the
 #: same length; few, so that neighbours in space stay neighbours in memory.
@@ -376,6 +376,15 @@ def worn_springs(
         lanes = values.reshape(lists.rows, columns, width)[:, :, lane_order(features)]
         values = lanes.transpose(0, 2, 1)
     return values.reshape(-1, columns)[lists.cells[0]].ravel()
+
+
+def half_rest_places(lists: Lists, features: GatherFeatures) -> np.ndarray:
+    """Where ``h`` of both ends of each spring is among the coefficients, (2, S), see above."""
+    width, columns = features.width, 4 if features.actuated else 2
+    if not features.vector:
+        return columns * lists.cells + 1
+    row, slot = np.divmod(lists.cells, width)
+    return (row * columns + 1) * width + np.array(lane_order(features))[slot]
 
 
 def _chunks(lists: Lists) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

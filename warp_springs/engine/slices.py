@@ -13,9 +13,10 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
+from warp_springs.engine.control import Pilot, Reach
 from warp_springs.engine.crowd import Crowd, crowds
 from warp_springs.engine.packing import aligned
-from warp_springs.kernels.buffers import BUNDLE, ENERGIES, real_dtype, structs
+from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 
 __all__ = ["Slice", "Tape", "cut", "run_all"]
@@ -64,7 +65,7 @@ class Slice:
     (loading is not safe on several); threads only launch them.
     """
 
-    launch_work, gang = LAUNCH_WORK, False
+    launch_work, gang, place = LAUNCH_WORK, False, "cpu"
 
     def __init__(
         self,
@@ -78,7 +79,7 @@ class Slice:
     ) -> None:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
-        self._features = group.features
+        self._features, self.precision = group.features, group.features.precision
         real = real_dtype(group.features.precision)
         size = scratch_size(group.features, *largest) + SCRATCH_GAP
         given = {
@@ -101,6 +102,22 @@ class Slice:
                 _recorded(observe, count, self._given),
             )
         self._advance, self._observe = self._launches[ledger]
+
+    def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
+        """Where controllers find some of its robots."""
+        slots, seen, cells = batch.slots, self._given["seen"], []
+        for robot in robots:
+            rows = batch.columns[robot] * np.arange(slots.springs[robot]) + 1
+            start = batch.bundles[slots.bundle[robot], BUNDLE.index("spring")]
+            place = start + rows * slots.width[robot] + slots.lane[robot]
+            cells.append(np.stack([place, place]))
+        chosen = np.array(robots)
+        place = slots.state[chosen] + slots.lane[chosen], slots.width[chosen]
+        lanes = slots.lane_indices(chosen, 1)[:, 0]
+        views = {name: getattr(seen, f"seen_{name}") for name in ("positions", "velocities")}
+        views["states"] = seen.seen_states
+        coefficients = self._given["model"].coefficients
+        return Reach(views, coefficients, np.stack([*place, lanes], axis=1), cells)
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all bundles from ``first_step`` to ``last_step``."""
@@ -127,6 +144,7 @@ class Tape:
         recorded: Those whose frames are kept.
         frames: Their positions [m], flat, shape (F, 3 * sum of M).
         energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
+        pilot: Who sets muscles between the steps, if anybody.
         done: Steps done so far.
         taken: Frames taken so far.
     """
@@ -136,6 +154,7 @@ class Tape:
     recorded: np.ndarray
     frame_steps: Sequence[int]
     energy: bool
+    pilot: Pilot | None = None
     done: int = 0
     taken: int = 0
     members: np.ndarray = field(init=False)
@@ -176,6 +195,8 @@ class Tape:
         steps = max(1, int(self.slice.launch_work / max(self.slice.work, 1)))
         while at < target and not stop.is_set():
             until = min(at + steps, target)
+            if self.pilot is not None:
+                until = min(until, self.pilot.until(at))
             self.slice.advance(at, until)
             at = until
             self.done = at - first
@@ -187,6 +208,8 @@ class Tape:
             self.frames[index] = buffers["seen_positions"][self._state]
         if self.energy:
             self.energies[index] = buffers["seen_energies"][self._lanes]
+            if self.pilot is not None:
+                self.energies[index, :, ENERGIES - len(ACCOUNTS)] += self.pilot.work[self.members]
 
     def cut_to(self, frames: int) -> Tape:
         """A tape of the first frames alone; they are complete once they are ``taken``."""

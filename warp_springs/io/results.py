@@ -80,6 +80,8 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> Path:
             _write(file, f"frames/{index}", np.asarray(result.frames(index), np.float64))
         for index, worn in result._worn.items():
             _write(file, f"worn/{index}", worn)
+        for index, signals in result._signals.items():
+            _write(file, f"signals/{index}", signals)
     return path
 
 
@@ -103,6 +105,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
             _velocities=entries["velocities"],
             _frames={index: entries[f"frames/{index}"] for index in fields["recorded"]},
             _worn={int(key[5:]): worn for key, worn in entries.items() if key[:5] == "worn/"},
+            _signals={int(k[8:]): s for k, s in entries.items() if k[:8] == "signals/"},
         )
     except OSError:
         raise

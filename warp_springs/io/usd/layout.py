@@ -227,7 +227,7 @@ def _elements_of(elements: Elements, springs: NDArray[np.intp]) -> Elements:
     if (table := elements.timetable) is not None:
         rows = {n: freeze(getattr(table, n)[springs]) for n in ("factors", "offsets")}
         changes["timetable"] = replace(table, **rows)
-    return elements.replace(**changes)
+    return elements.replace(**changes, controllers=())  # what is drawn needs no brain
 
 
 def _room(tracks: Sequence[Track], start: FloatArray, solids: Sequence[FloatArray]) -> float:
