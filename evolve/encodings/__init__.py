@@ -13,6 +13,7 @@ from evolve.encodings.direct import DirectEncoding, DirectSettings
 from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
 from evolve.encodings.fourier import FourierEncoding, FourierSettings
 from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
+from evolve.encodings.morphology import MorphologyEncoding, MorphologySettings
 from evolve.encodings.neural import NeuralEncoding, NeuralSettings
 from evolve.encodings.regions import RegionsEncoding, RegionsSettings
 from evolve.encodings.voxels import VoxelsEncoding, VoxelsSettings
@@ -34,6 +35,8 @@ __all__ = [
     "FourierSettings",
     "HarmonicsEncoding",
     "HarmonicsSettings",
+    "MorphologyEncoding",
+    "MorphologySettings",
     "NeuralEncoding",
     "NeuralSettings",
     "RegionsEncoding",
@@ -51,5 +54,6 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "neural": NeuralEncoding,
     "cppn": CppnEncoding,
     "voxels": VoxelsEncoding,
+    "morphology": MorphologyEncoding,
 }
 """Name in the configuration -> class."""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
-from evolve.bodies.plan import connected_parts
+from evolve.bodies.operators import BODY, CONTROL, mirror, varied
+from evolve.bodies.plan import connected_parts, tidied
 from evolve.encodings import ENCODINGS
 from evolve.fitness import FITNESS, Trial
 from evolve.search import Search
@@ -156,6 +157,67 @@ def test_what_does_not_hang_together_is_left_out():
     assert np.flatnonzero(masks[1]).tolist() == [1]
     full = cls(None, cls.Settings(cells=(4, 2, 1), least_voxels=4)).masks(presence)
     assert (full.sum(axis=1) == 4).all()
+
+
+def edges_of(plan):
+    """Directed edges of the faces."""
+    return {(int(f[i]), int(f[(i + 1) % 3])) for f in plan.faces for i in range(3)}
+
+
+def test_ten_thousand_random_operators_leave_a_valid_body():
+    encoding = make("morphology")
+    cls = type(encoding)
+    encoding = cls(SEED_BODY, cls.Settings(most_masses=30, most_springs=160))
+    operators = (*BODY, *CONTROL)
+    plans, chance = [encoding.ancestor] * 2, rng(3)
+    used = dict.fromkeys(operators, 0)
+    sizes = set()
+    for step in range(10_000):
+        which = operators[chance.integers(len(operators))]
+        before = plans[step % 2]
+        after = varied(before, (which,), encoding._fits, chance, attempts=1)
+        used[which] += after is not before
+        if step % 50 == 49:
+            after = encoding.cross([after], [plans[1 - step % 2]], chance)[0]
+        plans[step % 2] = after
+        sizes.add((after.n_masses, after.n_springs))
+        assert encoding._fits(after) and (after.degrees >= 3).all()
+        assert (after.shares > 0.0).all() and after.faces.max(initial=0) < after.n_masses
+        if step % 20 == 0:
+            robot = encoding.express([after])[0]
+            assert_is_a_body(robot)
+            assert robot.mass == pytest.approx(encoding.settings.mass)
+    assert min(used.values()) > 20, "every operator does something"
+    assert len(sizes) > 50
+
+
+def test_operators_do_what_they_say():
+    encoding = make("morphology")
+    plan = encoding.ancestor
+    by_name = {operator.__name__: operator for operator in BODY}
+    found = {name: operator(plan, rng(4)) for name, operator in by_name.items()}
+    m, s = plan.n_masses, plan.n_springs
+    assert (found["remove_spring"].n_masses, found["remove_spring"].n_springs) == (m, s - 1)
+    assert (found["add_spring"].n_masses, found["add_spring"].n_springs) == (m, s + 1)
+    assert (found["add_mass"].n_masses, found["add_mass"].n_springs) == (m + 1, s + 4)
+    assert found["remove_mass"].n_masses == m - 1
+    split = found["split_spring"]
+    assert split.n_masses == m + 1 and split.n_springs >= s + 2
+    np.testing.assert_allclose(found["move_weight"].shares.sum(), plan.shares.sum(), rtol=1e-6)
+    assert (found["move_weight"].shares != plan.shares).sum() == 2
+    assert (found["move_place"].positions != plan.positions).any(axis=1).sum() == 1
+    # Surfaces stay closed: every edge of a face is one of its neighbour the other way round.
+    for name in ("add_mass", "remove_mass"):
+        edges = edges_of(found[name])
+        assert edges == {(b, a) for a, b in edges}, name
+
+
+def test_a_mirrored_body_is_symmetric_and_alternates():
+    encoding = make("morphology")
+    plan = encoding.random(1, rng(9))[0]
+    mirrored = tidied(mirror(plan, rng(2)))
+    robot = encoding.express([mirrored])[0]
+    assert FITNESS["symmetry"](Trial([robot], None, []))[0] > 0.97
 
 
 def test_a_tower_that_falls_is_not_steady():
