@@ -9,6 +9,7 @@ from __future__ import annotations
 from evolve.encodings.actuation import ActuationSettings, FixedBody
 from evolve.encodings.base import ArrayGenomes, Encoding, EncodingSettings
 from evolve.encodings.cppn import CppnEncoding, CppnSettings
+from evolve.encodings.cppn_body import CppnBodyEncoding, CppnBodySettings
 from evolve.encodings.direct import DirectEncoding, DirectSettings
 from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
 from evolve.encodings.fourier import FourierEncoding, FourierSettings
@@ -22,6 +23,8 @@ __all__ = [
     "ENCODINGS",
     "ActuationSettings",
     "ArrayGenomes",
+    "CppnBodyEncoding",
+    "CppnBodySettings",
     "CppnEncoding",
     "CppnSettings",
     "DirectEncoding",
@@ -55,5 +58,6 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "cppn": CppnEncoding,
     "voxels": VoxelsEncoding,
     "morphology": MorphologyEncoding,
+    "cppn_body": CppnBodyEncoding,
 }
 """Name in the configuration -> class."""

@@ -50,18 +50,16 @@ class AgeFitness(Breeder):
         self._young_ages = np.zeros(0, np.int64)
 
     def _ask(self, n: int) -> tuple[Genomes, np.ndarray]:
-        fresh, nobody = self._newcomers(n)
         self._young_ages = np.zeros(n, np.int64)
         if self._survivors is None:
-            return fresh, nobody
-        parents = self._parents(n)
+            return self._newcomers(n)
+        count = min(max(1, round(self.settings.newcomers * n)), n)
+        fresh, nobody = self._newcomers(count)
+        parents = self._parents(n - count)
         young, ids = self._children(parents)
-        newcomers = np.arange(n) >= n - max(1, round(self.settings.newcomers * n))
-        both = self.encoding.concatenate([young, fresh])
-        genomes = self.encoding.take(both, np.arange(n) + n * newcomers)
         older = np.where(ids == NOBODY, 0, self._ages[parents]).max(axis=1)
-        self._young_ages = np.where(newcomers, 0, older + 1)
-        return genomes, np.where(newcomers[:, None], NOBODY, ids)
+        self._young_ages[: n - count] = older + 1
+        return self.encoding.concatenate([young, fresh]), np.concatenate([ids, nobody])
 
     def _tell(self, individuals: Individuals) -> None:
         ages, pool = self._young_ages, individuals

