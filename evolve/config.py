@@ -92,6 +92,8 @@ class TrialsConfig(PerturbationConfig):
 
     count: int = Field(1, ge=1)
     """How many; one alone is not perturbed."""
+    terrain: bool = True
+    """Whether every trial has rough ground of its own, the seed of its scene counted on."""
     friction: float = Field(0.0, ge=0.0, lt=1.0)
     """The friction coefficients of the trials range from 1 - this to 1 + this times those of the
     scene, evenly."""
@@ -122,6 +124,10 @@ class TaskConfig(configs.Section):
     """Further measures to record of every robot, beside its way and its height."""
     direction: tuple[float, float] = (1.0, 0.0)
     """Where forward is, over the ground; for the fitness `forward`."""
+    goals: tuple[configs.Triple, ...] = ()
+    """Places that the robots sense, and should reach, one in each of as many trials [m]."""
+    goal_motion: configs.Triple = (0.0, 0.0, 0.0)
+    """How the goals move [m/s]."""
     settle: float = Field(1.0, gt=0.0)
     """How long they move before they are measured [cycles]."""
     measure: float = Field(4.0, gt=0.0)
@@ -206,6 +212,15 @@ class RunConfig(configs.Section):
                 f"simulation.dt = {longest:g} s is too long for cycles of "
                 f"{self.encoding.period:g} s: at most a tenth of encoding.period"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _goals_are_given(self) -> RunConfig:
+        measures = (self.task.fitness, *self.descriptors)
+        asking = [name for name in measures if FITNESS[_known_measure(name)].needs_goal]
+        asking += [s for s in getattr(self.encoding, "sensors", ()) if s in ("goal", "light")]
+        if asking and not self.task.goals:
+            raise ValueError(f"task.goals: none given, and {asking[0]!r} needs one")
         return self
 
     @model_validator(mode="after")

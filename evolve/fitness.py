@@ -39,6 +39,10 @@ class Trial:
     """The measurement, in one piece or in several that follow each other."""
     direction: tuple[float, float] = (1.0, 0.0)
     """Where forward is: a vector over the ground of length one."""
+    goal: tuple[float, float, float] | None = None
+    """Where the goal is at time 0 [m]."""
+    motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How it moves [m/s]."""
 
     @property
     def measured(self) -> ws.Result:
@@ -54,6 +58,14 @@ class Trial:
     def path(self) -> np.ndarray:
         """Centre of mass at the start and after each of K pieces [m], shape (N, K + 1, 3)."""
         return np.stack([r.center_of_mass for r in (self.settled, *self.pieces)], axis=1)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Distance over the ground to the goal at the times of `path` [m], shape (N, K + 1)."""
+        times = np.array([r.end_time for r in (self.settled, *self.pieces)])
+        goal = np.asarray(self.goal) + times[:, None] * np.asarray(self.motion)
+        way = self.path[:, :, :2] - goal[:, :2]
+        return np.hypot(way[..., 0], way[..., 1])
 
     @property
     def work(self) -> np.ndarray:
@@ -79,6 +91,7 @@ class Measure:
     unit: str
     needs_path: bool
     needs_energy: bool
+    needs_goal: bool = False
 
     def __call__(self, trial: Trial) -> np.ndarray:
         """The figure of each robot, shape (N,)."""
@@ -98,7 +111,7 @@ UNITS: dict[str, str] = {}
 
 
 def measure(
-    unit: str, path: bool = False, energy: bool = False
+    unit: str, path: bool = False, energy: bool = False, goal: bool = False
 ) -> Callable[[Callable[[Trial], np.ndarray]], Measure]:
     """Register a function of a trial under its name.
 
@@ -106,10 +119,11 @@ def measure(
         unit: Of its figures.
         path: Whether it reads `Trial.path` between its ends: `SAMPLES_PER_CYCLE` pieces a cycle.
         energy: Whether it reads `Trial.work`, or energies of the results.
+        goal: Whether it reads `Trial.goal`.
     """
 
     def register(function: Callable[[Trial], np.ndarray]) -> Measure:
-        found = Measure(function, unit, path, energy)
+        found = Measure(function, unit, path, energy, goal)
         FITNESS[function.__name__] = found
         UNITS[function.__name__] = unit
         return found
@@ -189,6 +203,19 @@ def straightness(trial: Trial) -> np.ndarray:
     """Net distance over the ground divided by the length of the way: 1 is straight."""
     steps = np.linalg.norm(np.diff(trial.path[:, :, :2], axis=1), axis=2).sum(axis=1)
     return np.divide(distance(trial), steps, out=np.zeros_like(steps), where=steps > 0.0)
+
+
+@measure("m", goal=True)
+def approach(trial: Trial) -> np.ndarray:
+    """How much nearer to the goal the centre of mass comes, over the ground."""
+    gap = trial.gap
+    return gap[:, 0] - gap[:, -1]
+
+
+@measure("", path=True, goal=True)
+def brightness(trial: Trial) -> np.ndarray:
+    """Mean level of the light of a lamp above the goal: 1 under it, one half a metre away."""
+    return (1.0 / (1.0 + trial.gap**2)).mean(axis=1)
 
 
 @measure("m")

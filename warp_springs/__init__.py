@@ -23,7 +23,17 @@ from warp_springs.scene import Collisions, Ground, Scene, Water, damping_rate
 from warp_springs.simulation import Simulation
 from warp_springs.stability import Limits, Status, stable_dt
 from warp_springs.startup import quiet
-from warp_springs.surfaces import Box, Circle, HeightField, Line, Plane, Sphere, height_map
+from warp_springs.surfaces import (
+    Box,
+    Circle,
+    HeightField,
+    Line,
+    Plane,
+    Sphere,
+    height_map,
+    hills,
+    rough_terrain,
+)
 
 __all__ = [
     "Box",
@@ -59,12 +69,14 @@ __all__ = [
     "export_html",
     "export_usd",
     "height_map",
+    "hills",
     "html_page",
     "materials",
     "plots",
     "quiet",
     "read_mesh",
     "render",
+    "rough_terrain",
     "sensors",
     "shapes",
     "stable_dt",

@@ -156,7 +156,6 @@ class Batch:
         levels: Halvings of the step of the run for each robot, shape (N,).
         wearing: For each robot whose springs may break, where they are in the buffer of the times
             when they broke, shape (S,), and its lane.
-        columns: Coefficients of a spring of each robot, shape (N,).
         robots: The robots.
         rounding: Energy that rounding alone may give each robot [J], shape (N,).
     """
@@ -181,7 +180,6 @@ class Batch:
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
-        self.columns = np.zeros(len(robots), np.int64)
 
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -306,7 +304,6 @@ class Batch:
         if strip.elements is not NONE:
             elements = element_buffers(strip.fields, order, method.spans(levels))
             table = np.concatenate([table, spring_columns(strip.fields, order)], axis=1)
-        self.columns[strip.ids] = table.shape[1]
         self._tables.append(self._describe(strip, width, table.shape[1], elements))
         self._append("rows", row)
         self._append("partners", partner)

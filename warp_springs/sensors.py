@@ -29,6 +29,8 @@ READINGS = {
     "clock": 2,
 }
 KINDS = tuple(READINGS)
+#: Those that look at a place.
+TARGETS = ("goal", "light")
 
 Triple = tuple[float, float, float]
 
@@ -98,7 +100,7 @@ def goal(place: ArrayLike, full: float = 1.0, motion: ArrayLike = (0.0, 0.0, 0.0
 
     The place moves with ``motion`` (3,) [m/s].
     """
-    return Sensor("goal", (), _triple("place", place), _triple("motion", motion), full)
+    return Sensor("goal", (), triple("place", place), triple("motion", motion), full)
 
 
 def light(
@@ -108,7 +110,7 @@ def light(
 
     The lamp is at ``place`` (3,) [m] and moves with ``motion`` (3,) [m/s].
     """
-    where = _triple("place", place), _triple("motion", motion)
+    where = triple("place", place), triple("motion", motion)
     return Sensor("light", _chosen("masses", masses), *where, full)
 
 
@@ -117,7 +119,8 @@ def clock(period: float) -> Sensor:
     return Sensor("clock", full=period)
 
 
-def _triple(name: str, value: ArrayLike) -> Triple:
+def triple(name: str, value: ArrayLike) -> Triple:
+    """Three finite numbers, refused with a ValueError where they are not."""
     return tuple(require_vector(name, value).tolist())
 
 

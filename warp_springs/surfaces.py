@@ -12,7 +12,18 @@ from warp_springs.body.fields import require_positive, require_vector
 from warp_springs.checks import check_number
 from warp_springs.geometry import FloatArray, rotation_matrix
 
-__all__ = ["Box", "Circle", "HeightField", "Line", "Plane", "Sphere", "Surface", "height_map"]
+__all__ = [
+    "Box",
+    "Circle",
+    "HeightField",
+    "Line",
+    "Plane",
+    "Sphere",
+    "Surface",
+    "height_map",
+    "hills",
+    "rough_terrain",
+]
 
 Triple = tuple[float, float, float]
 
@@ -174,6 +185,76 @@ def height_map(path: str | Path, lowest: float, highest: float) -> FloatArray:
     except (UnidentifiedImageError, OSError) as error:
         raise ValueError(f"height_map: {path} cannot be read as a picture: {error}") from None
     return lowest + (highest - lowest) * grey[::-1].T / white
+
+
+def rough_terrain(
+    seed: int,
+    height: float = 0.05,
+    feature: float = 0.3,
+    size: float = 8.0,
+    spacing: float = 0.1,
+    **surface: float,
+) -> HeightField:
+    """Hills that a seed decides: a square about the origin whose highest point is at z = 0.
+
+    Sixteen waves of random directions and phases, with wavelengths from ``feature`` up to four
+    times that, are added up.
+
+    Args:
+        seed: Of the hills; the same seed gives the same hills.
+        height: From the lowest point to the highest [m].
+        feature: Shortest wavelength [m].
+        size: Edge of the square [m]; beyond it the ground is flat.
+        spacing: Distance of grid points [m].
+        surface: Stiffness and friction, as of `HeightField`.
+
+    Raises:
+        ValueError: A number is out of range.
+    """
+    require_positive("feature", feature)
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
+    waves = rng.random((16, 4))
+    waves[:, 0] = feature * 4.0 ** waves[:, 0]
+    waves[:, 1:3] *= 2.0 * np.pi
+    waves[:, 3] = 1.0
+    return hills(waves, height, size, spacing, **surface)
+
+
+def hills(
+    waves: ArrayLike, height: float, size: float = 8.0, spacing: float = 0.1, **surface: float
+) -> HeightField:
+    """Hills that are a sum of waves: a square about the origin whose highest point is at z = 0.
+
+    Args:
+        waves: Wavelength [m], direction [rad], phase [rad] and weight of each, shape (n, 4); long
+            waves are high: the height of each is its weight times its wavelength, up to a factor.
+        height: From the lowest point to the highest [m].
+        size: Edge of the square [m]; beyond it the ground is flat.
+        spacing: Distance of grid points [m].
+        surface: Stiffness and friction, as of `HeightField`.
+
+    Raises:
+        ValueError: A number is out of range, or a wave is shorter than two grid points.
+    """
+    for name, value in {"height": height, "size": size, "spacing": spacing}.items():
+        require_positive(name, value)
+    table = np.asarray(waves, np.float64)
+    if table.ndim != 2 or table.shape[1] != 4 or not len(table) or not np.isfinite(table).all():
+        raise ValueError(f"waves: shape {table.shape} given, finite numbers (n, 4) expected")
+    if table[:, 0].min() < 2.0 * spacing:
+        raise ValueError(
+            f"waves: a wavelength of {table[:, 0].min():g} m is shorter than two grid points, "
+            f"{2.0 * spacing:g} m"
+        )
+    along = np.arange(-size / 2.0, size / 2.0 + spacing / 2.0, spacing)
+    x, y = np.meshgrid(along, along, indexing="ij")
+    heights = np.zeros_like(x)
+    for wavelength, turn, phase, weight in table.tolist():
+        angle = 2.0 * np.pi / wavelength * (x * np.cos(turn) + y * np.sin(turn)) + phase
+        heights += weight * wavelength * np.sin(angle)
+    steep = float(np.ptp(heights))
+    heights = (heights - heights.max()) * (height / steep if steep > 0.0 else 0.0)
+    return HeightField(heights, spacing, (along[0], along[0], 0.0), **surface)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ configuration.
 from __future__ import annotations
 
 from evolve.encodings.actuation import ActuationSettings, FixedBody
+from evolve.encodings.arena import ArenaEncoding, ArenaSettings
 from evolve.encodings.base import ArrayGenomes, Encoding, EncodingSettings
+from evolve.encodings.controller import ControllerEncoding, ControllerSettings
 from evolve.encodings.cppn import CppnEncoding, CppnSettings
 from evolve.encodings.cppn_body import CppnBodyEncoding, CppnBodySettings
 from evolve.encodings.direct import DirectEncoding, DirectSettings
@@ -22,7 +24,11 @@ from evolve.encodings.voxels import VoxelsEncoding, VoxelsSettings
 __all__ = [
     "ENCODINGS",
     "ActuationSettings",
+    "ArenaEncoding",
+    "ArenaSettings",
     "ArrayGenomes",
+    "ControllerEncoding",
+    "ControllerSettings",
     "CppnBodyEncoding",
     "CppnBodySettings",
     "CppnEncoding",
@@ -59,5 +65,7 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "voxels": VoxelsEncoding,
     "morphology": MorphologyEncoding,
     "cppn_body": CppnBodyEncoding,
+    "controller": ControllerEncoding,
+    "arena": ArenaEncoding,
 }
 """Name in the configuration -> class."""

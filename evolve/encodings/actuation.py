@@ -118,7 +118,7 @@ class FixedBody:
         """The robots of fields of `ws.Variants`, whose passive springs are those of the body."""
         passive = self._passive
         for name, value in fields.items() if len(passive) else ():
-            if name != "omega":
+            if name not in ("omega", "weights"):
                 value = fields[name] = np.array(value)
                 value[:, passive] = getattr(self.body, name)[passive] if name in OWN else 0.0
         return self.body.variants(**fields)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from evolve.config import RunConfig
+from evolve.config import RunConfig, SceneConfig
 from evolve.fitness import FITNESS, SAMPLES_PER_CYCLE, Trial
 from evolve.judging.scores import Scores
 from evolve.judging.second_look import SecondLook, quantile, share
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     import warp_springs as ws
 
 __all__ = ["Evaluator"]
+
+Place = tuple[float, float, float]
+
+MARK = 0.06
+"""Radius of the ball that marks a goal in films [m]."""
 
 
 class Evaluator:
@@ -35,6 +41,8 @@ class Evaluator:
         """Names of what is measured beside the fitness."""
         self.simulation = config.simulation
         self.scene = config.scene.build()
+        self._scenery = config.scene
+        self._goals = config.task.goals or (None,)
         self.streams = Streams(config.seed)
         self.period = config.encoding.period
         """Time of a cycle of the muscles [s]."""
@@ -46,19 +54,25 @@ class Evaluator:
     def __call__(self, robots: Sequence[ws.Robot]) -> Scores:
         """Simulate the robots, all at once, and score them."""
         started = time.perf_counter()
-        if self.task.trials.count == 1:
-            scores = self._score(robots, robots, self.scene)
-        else:
-            scores = self._mean(list(self._several(robots)))
+        scores = [
+            self._score(starts, robots, scene, goal)
+            for starts, scene in self._starts(robots)
+            for goal in self._goals
+        ]
+        scores = scores[0] if len(scores) == 1 else self._mean(scores)
         return replace(scores, wall_time=time.perf_counter() - started)
 
-    def _several(self, robots: Sequence[ws.Robot]) -> Iterator[Scores]:
-        """Scores of each of the trials: a floor of its own, starts of their own."""
+    def _starts(self, robots: Sequence[ws.Robot]) -> Iterator[tuple[Sequence[ws.Robot], ws.Scene]]:
+        """The robots and their world in each of the trials: a floor and starts of its own."""
         settings = self.task.trials
+        if settings.count == 1:
+            yield robots, self.scene
+            return
         starts = scattered(robots, settings, self.streams, settings.count)
         spread = np.linspace(-settings.friction, settings.friction, settings.count)
-        for start, change in zip(starts, spread, strict=True):
-            yield self._score(start, robots, _rougher(self.scene, 1.0 + float(change)))
+        for trial, (start, change) in enumerate(zip(starts, spread, strict=True)):
+            scene = _of_next_seeds(self._scenery, trial * settings.terrain).build()
+            yield start, _rougher(scene, 1.0 + float(change))
 
     def _mean(self, trials: Sequence[Scores]) -> Scores:
         """One score for each robot from those of its trials."""
@@ -77,12 +91,16 @@ class Evaluator:
         )
 
     def _score(
-        self, starts: Sequence[ws.Robot], robots: Sequence[ws.Robot], scene: ws.Scene
+        self,
+        starts: Sequence[ws.Robot],
+        robots: Sequence[ws.Robot],
+        scene: ws.Scene,
+        goal: Place | None,
     ) -> Scores:
         """Scores of one trial of robots that begin it as `starts`."""
-        simulation = self._simulate(starts, scene=scene)
+        simulation = self._simulate(self._aimed(starts, goal), scene=scene)
         # Measures look at a robot as it was built, not as it was bent for the start.
-        trial = self._trial(simulation, robots)
+        trial = self._trial(simulation, robots, goal)
         status = np.asarray(trial.measured.status, dtype=np.int64)
         found = {name: FITNESS[name](trial) for name in self.descriptors}
         return Scores(
@@ -91,6 +109,12 @@ class Evaluator:
             descriptors={k: np.where(status == 0, v, np.nan) for k, v in found.items()},
             spring_evaluations=_costs(trial, simulation.robot_dt),
         )
+
+    def within(self, scene: ws.Scene) -> Evaluator:
+        """The same trial in another world."""
+        other = copy.copy(self)
+        other.scene = scene
+        return other
 
     def prepare(self, robots: Sequence[ws.Robot]) -> None:
         """Load the kernels for such robots: a new machine compiles them first."""
@@ -111,8 +135,8 @@ class Evaluator:
         halved = np.full(len(robots), np.nan)
         for step in np.unique(dt):
             alike = np.flatnonzero(dt == step)
-            again = self._simulate([robots[i] for i in alike], float(step), "float64")
-            halved[alike] = self._fitness(self._trial(again))
+            some = [robots[i] for i in alike]
+            halved[alike] = self._looked(some, some, float(step), "float64")
         starts = [
             start
             for robot in robots
@@ -120,7 +144,7 @@ class Evaluator:
         ]
         # The fitness measures a robot as it was built, not as it was bent for the start.
         built = [robot for robot in robots for _ in range(settings.trials)]
-        trials = self._fitness(self._trial(self._simulate(starts), built))
+        trials = self._looked(starts, built)
         usual = quantile(trials.reshape(len(robots), settings.trials), settings.quantile)
         kept = share(halved, fitness), share(usual, fitness)
         survives = (kept[0] >= settings.threshold) & (kept[1] >= settings.threshold)
@@ -134,17 +158,63 @@ class Evaluator:
         energy: bool = False,
         progress: Callable[[float], None] | None = None,
     ) -> ws.Result:
-        """Simulate a whole trial, or more cycles if asked, and record all frames of all robots."""
+        """Simulate a whole trial, or more cycles if asked, and record all frames of all robots.
+
+        They make for the first goal, if there are any; a ball marks where it is at the end.
+        """
         duration = max(self.settle + self.measure, least_cycles * self.period)
-        return self._simulate(robots).run(duration, fps=fps, energy=energy, progress=progress)
+        simulation = self._simulate(self._aimed(robots, self._goals[0]))
+        seen = simulation.run(duration, fps=fps, energy=energy, progress=progress)
+        return self._marked(seen, self._goals[0])
+
+    def _marked(self, result: ws.Result, goal: Place | None) -> ws.Result:
+        """The result with a ball where its goal is at the end."""
+        import warp_springs as ws
+
+        ground = result.scene.ground
+        if goal is None or (ground is not None and ground.friction == "course"):
+            return result
+        place = np.asarray(goal) + result.end_time * np.asarray(self.task.goal_motion)
+        ball = ws.Sphere(center=tuple(place.tolist()), radius=MARK)
+        scene = replace(result.scene, obstacles=(*result.scene.obstacles, ball))
+        return replace(result, scene=scene)
+
+    def _looked(
+        self,
+        starts: Sequence[ws.Robot],
+        built: Sequence[ws.Robot],
+        dt: float | None = None,
+        precision: str | None = None,
+    ) -> np.ndarray:
+        """Fitness of robots at a second look, shape (N,), over all goals."""
+        found = [
+            self._fitness(
+                self._trial(self._simulate(self._aimed(starts, goal), dt, precision), built, goal)
+            )
+            for goal in self._goals
+        ]
+        return found[0] if len(found) == 1 else aggregate(found, self.task.trials.aggregate)
+
+    def _aimed(self, robots: Sequence[ws.Robot], goal: Place | None) -> Sequence[ws.Robot]:
+        """The robots with a goal that their sensors look for."""
+        import warp_springs as ws
+
+        if goal is None:
+            return robots
+        motion = self.task.goal_motion
+        if isinstance(robots, ws.Variants):
+            return robots.body.aimed(goal, motion).variants(**robots.stacked)
+        return [robot.aimed(goal, motion) for robot in robots]
 
     def _fitness(self, trial: Trial) -> np.ndarray:
         """Fitness of every robot, shape (N,); NaN for those who were stopped."""
         stopped = np.asarray(trial.measured.status) != 0
         return np.where(stopped, np.nan, FITNESS[self.task.fitness](trial))
 
-    def _trial(self, simulation: ws.Simulation, robots: Sequence[ws.Robot] | None = None) -> Trial:
-        """Run a trial; `robots` is whom to measure if not who was simulated."""
+    def _trial(
+        self, simulation: ws.Simulation, robots: Sequence[ws.Robot], goal: Place | None
+    ) -> Trial:
+        """Run a trial; `robots` is whom to measure."""
         used = [FITNESS[name] for name in (self.task.fitness, *self.descriptors)]
         energy = any(measure.needs_energy for measure in used)
         count = 1
@@ -155,9 +225,7 @@ class Evaluator:
         ends = self.settle + self.measure * np.arange(1, count + 1) / count
         pieces = [simulation.run(end - simulation.time, energy=energy) for end in ends]
         direction = np.array(self.task.direction) / np.hypot(*self.task.direction)
-        return Trial(
-            simulation.robots if robots is None else robots, settled, pieces, tuple(direction)
-        )
+        return Trial(robots, settled, pieces, tuple(direction), goal, self.task.goal_motion)
 
     def _simulate(
         self,
@@ -180,6 +248,15 @@ class Evaluator:
             layout=settings.layout,
             threads=settings.threads,
         )
+
+
+def _of_next_seeds(scene: SceneConfig, shift: int) -> SceneConfig:
+    """The scene with other rough ground, so many seeds on."""
+    rough = [
+        o.model_copy(update={"seed": o.seed + shift}) if o.type == "rough" else o
+        for o in scene.obstacles
+    ]
+    return scene.model_copy(update={"obstacles": tuple(rough)})
 
 
 def _rougher(scene: ws.Scene, factor: float) -> ws.Scene:

@@ -11,6 +11,7 @@ import numpy as np
 
 from evolve.encodings.base import Encoding, Genomes
 from evolve.judging.scores import Scores
+from evolve.judging.worlds import judged
 
 if TYPE_CHECKING:
     from evolve.config import RunConfig
@@ -45,7 +46,7 @@ class Here:
 
     def submit(self, genomes: Genomes, blobs: Sequence[bytes]) -> Ticket:
         """The scores are computed the first time that somebody waits for them."""
-        return cache(lambda: self._evaluator(self._encoding.express(genomes)))
+        return cache(lambda: judged(self._evaluator, self._encoding, genomes))
 
     def prepare(self, genomes: Genomes, blobs: Sequence[bytes]) -> None:
         """Load the kernels for such genomes."""

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from evolve.judging.worlds import judged
+
 __all__ = ["Answer", "Workshop", "chunks", "cores"]
 
 CHUNKS_PER_WORKER = 2
@@ -44,8 +46,7 @@ class Workshop:
 
     def judge(self, blobs: Sequence[bytes]) -> Answer:
         """Scores of genomes, given by their bytes."""
-        robots = self.encoding.express(self.encoding.from_bytes(blobs))
-        scores = self.evaluator(robots)
+        scores = judged(self.evaluator, self.encoding, self.encoding.from_bytes(blobs))
         return scores.fitness, scores.status, dict(scores.descriptors), scores.spring_evaluations
 
 

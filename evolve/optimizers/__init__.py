@@ -9,6 +9,7 @@ from __future__ import annotations
 from evolve.optimizers.age_fitness import AgeFitness, AgeFitnessSettings
 from evolve.optimizers.base import NOBODY, Candidates, Individuals, Optimizer, OptimizerSettings
 from evolve.optimizers.cma_es import CmaEs, CmaEsSettings
+from evolve.optimizers.coevolution import Coevolution, CoevolutionSettings
 from evolve.optimizers.crowding import CrowdingSettings, DeterministicCrowding
 from evolve.optimizers.genetic import GeneticAlgorithm, GeneticSettings
 from evolve.optimizers.hill_climber import HillClimber, HillClimberSettings
@@ -25,6 +26,8 @@ __all__ = [
     "Candidates",
     "CmaEs",
     "CmaEsSettings",
+    "Coevolution",
+    "CoevolutionSettings",
     "CrowdingSettings",
     "DeterministicCrowding",
     "GeneticAlgorithm",
@@ -54,5 +57,6 @@ OPTIMIZERS: dict[str, type[Optimizer]] = {
     "cma": CmaEs,
     "nsga2": Nsga2,
     "map_elites": MapElites,
+    "coevolution": Coevolution,
 }
 """Name in the configuration -> class."""

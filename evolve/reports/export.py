@@ -10,7 +10,8 @@ import numpy as np
 
 from evolve.errors import RunError
 from evolve.judging.evaluate import Evaluator
-from evolve.reports.show import FILM_CYCLES, Show, Style, Watch, express, label
+from evolve.judging.worlds import looked_at_again
+from evolve.reports.show import FILM_CYCLES, Show, Style, Watch, label
 from evolve.run import Run
 from evolve.store import Finalist, Store
 
@@ -140,7 +141,10 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     ids = store.best(max(best, run.config.task.second_look.candidates))
     if not ids:
         raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to export")
-    look = Evaluator(run.config).second_look(express(run, store, ids), store.scores(ids).fitness)
+    encoding = run.config.make_encoding()
+    genomes = encoding.from_bytes(store.genomes(ids))
+    fitness = store.scores(ids).fitness
+    look = looked_at_again(Evaluator(run.config), encoding, genomes, fitness)
     store.put_second_look(ids, look)
     return store.finalists()
 

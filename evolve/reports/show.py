@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evolve.judging.evaluate import Evaluator
+from evolve.judging.worlds import film_of
 from evolve.run import Run
 from evolve.store import Finalist, Store
 
@@ -58,8 +59,11 @@ class Show:
 
     def simulate(self, ids: Sequence[int], energy: bool = False) -> ws.Result:
         """The whole trial of some individuals, three cycles at least, with all frames."""
-        return Evaluator(self._run.config).film(
-            express(self._run, self._store, ids),
+        encoding = self._run.config.make_encoding()
+        return film_of(
+            Evaluator(self._run.config),
+            encoding,
+            encoding.from_bytes(self._store.genomes(ids)),
             least_cycles=FILM_CYCLES,
             energy=energy,
             progress=partial(self._watch, "simulating"),

@@ -157,6 +157,24 @@ def test_splitting_and_looking_change_no_bit_and_layouts_agree(body, layout):
     assert np.abs(whole.positions(0) - whole.positions(3)).max() > 1e-3
 
 
+@pytest.mark.parametrize("layout", ["lanes", "flat", "block"])
+def test_special_and_breathing_springs_obey_too(body, layout):
+    """The muscles' own rest lengths, set once for all, and a controller that asks for the same."""
+    plain = body.with_cables([4, 8]).with_dashpots(0.05).breathing(0.05, omega=9.0)
+    constant = ws.Controller([sensors.tilt()], [4, 6, 8], hidden=0, reach=0.2)
+    weights = np.zeros((3, 3))
+    weights[:, 2] = 0.3, -0.4, 0.6
+    asked = plain.rest_length.copy()
+    asked[[4, 6, 8]] *= 1.0 + 0.2 * np.tanh(weights[:, 2])
+    controlled = plain.controlled(constant.replace(weights=weights.ravel()))
+    ends = [
+        ws.Simulation(robot, SCENES["ground"], dt=DT, layout=layout).run(0.2).positions(0)
+        for robot in (controlled, plain.replace(rest_length=asked), plain)
+    ]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
+    assert np.abs(ends[0] - ends[2]).max() > 1e-3
+
+
 def test_variants_differ_in_their_weights_and_company_changes_no_bit(body):
     made = controller(body)
     weights = np.random.default_rng(5).normal(size=(19, made.n_weights))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warp_springs.checks import check_number
 from warp_springs.geometry import FloatArray
-from warp_springs.sensors import Sensor
+from warp_springs.sensors import TARGETS, Sensor, triple
 
 __all__ = ["Controller", "body_frame"]
 
@@ -101,6 +101,12 @@ class Controller:
     def replace(self, **changes: Any) -> Controller:
         """The same controller with some fields replaced."""
         return replace(self, **changes)
+
+    def aimed(self, place: ArrayLike, motion: ArrayLike) -> Controller:
+        """The same with its goals and lights elsewhere, see `Robot.aimed`."""
+        where = {"place": triple("place", place), "motion": triple("motion", motion)}
+        sensors = [replace(s, **where) if s.kind in TARGETS else s for s in self.sensors]
+        return replace(self, sensors=tuple(sensors))
 
     def checked(self, weights: ArrayLike, leading: tuple[int, ...] = ()) -> FloatArray:
         """Weights of this network, shape (*leading, n_weights), as a read-only float64 copy.

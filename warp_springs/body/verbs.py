@@ -209,6 +209,14 @@ class Verbs:
         attached = controller.replace(frame=body_frame(self.masses, self.positions))
         return self._with_elements(controllers=(*others, attached))
 
+    def aimed(self, place: ArrayLike, motion: ArrayLike = (0.0, 0.0, 0.0)) -> Robot:
+        """The robot with every goal and light that its controllers sense at a place (3,) [m].
+
+        The place moves with ``motion`` (3,) [m/s].
+        """
+        controllers = self.elements.controllers
+        return self._with_elements(controllers=tuple(c.aimed(place, motion) for c in controllers))
+
     # -- forces and constraints ---------------------------------------------------------------
 
     def pushed(

@@ -128,6 +128,26 @@ class HeightFieldConfig(Obstacle):
         return surfaces.HeightField(heights=heights, **settings)
 
 
+class RoughConfig(Obstacle):
+    """Hills that a seed decides; their highest point is at z = 0."""
+
+    type: Literal["rough"]
+    seed: int = Field(1, ge=0)
+    """Of the hills."""
+    height: float = Field(0.05, gt=0.0)
+    """From the lowest point to the highest [m]."""
+    feature: float = Field(0.3, gt=0.0)
+    """Shortest wavelength [m]."""
+    size: float = Field(8.0, gt=0.0)
+    """Edge of the square about the origin that they cover [m]."""
+    spacing: float = Field(0.1, gt=0.0)
+    """Distance of grid points [m]."""
+
+    def build(self) -> surfaces.HeightField:
+        """Make the terrain."""
+        return surfaces.rough_terrain(**self.model_dump(exclude={"type"}))
+
+
 class WaterConfig(Section):
     """Water below a level."""
 
@@ -173,7 +193,7 @@ class SceneConfig(Section):
     """Velocity of the air [m/s]; needs drag."""
     water: WaterConfig | None = None
     obstacles: tuple[
-        one_of((PlaneConfig, SphereConfig, BoxConfig, HeightFieldConfig), "type"), ...
+        one_of((PlaneConfig, SphereConfig, BoxConfig, HeightFieldConfig, RoughConfig), "type"), ...
     ] = ()
     collisions: CollisionsConfig | None = None
 

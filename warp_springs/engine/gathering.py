@@ -380,7 +380,7 @@ def worn_springs(
 
 def half_rest_places(lists: Lists, features: GatherFeatures) -> np.ndarray:
     """Where ``h`` of both ends of each spring is among the coefficients, (2, S), see above."""
-    width, columns = features.width, 4 if features.actuated else 2
+    width, columns = features.width, features.traits.columns(features.actuated)
     if not features.vector:
         return columns * lists.cells + 1
     row, slot = np.divmod(lists.cells, width)

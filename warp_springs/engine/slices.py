@@ -106,8 +106,9 @@ class Slice:
     def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
         """Where controllers find some of its robots."""
         slots, seen, cells = batch.slots, self._given["seen"], []
+        columns = self._features.traits.columns(self._features.actuated)
         for robot in robots:
-            rows = batch.columns[robot] * np.arange(slots.springs[robot]) + 1
+            rows = columns * np.arange(slots.springs[robot]) + 1
             start = batch.bundles[slots.bundle[robot], BUNDLE.index("spring")]
             place = start + rows * slots.width[robot] + slots.lane[robot]
             cells.append(np.stack([place, place]))
