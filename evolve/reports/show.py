@@ -19,7 +19,7 @@ from evolve.store import Finalist, Store
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["FILM_CYCLES", "Show", "Style", "Watch", "express", "label"]
+__all__ = ["FILM_CYCLES", "Show", "Style", "Watch", "label"]
 
 FILM_CYCLES = 3
 """Cycles of the muscles that an animation shows at least."""
@@ -124,12 +124,6 @@ class Show:
             }
             for place, individual in enumerate(ids)
         ]
-
-
-def express(run: Run, store: Store, ids: Sequence[int]) -> Sequence[ws.Robot]:
-    """The robots of some individuals."""
-    encoding = run.config.make_encoding()
-    return encoding.express(encoding.from_bytes(store.genomes(ids)))
 
 
 def label(member: Finalist) -> str:

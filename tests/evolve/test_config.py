@@ -55,7 +55,8 @@ def test_a_configuration_survives_being_written(about, damping, low, seed):
 
 @pytest.mark.parametrize("name", OPTIMIZERS)
 def test_every_optimizer_can_be_chosen_by_its_name(name):
-    config = load("cube", {"optimizer.type": name})
+    encoding = "arena" if name == "coevolution" else "direct"
+    config = load("cube", {"optimizer.type": name, "encoding.type": encoding})
     assert isinstance(config.make_optimizer(config.make_encoding()), OPTIMIZERS[name])
 
 
@@ -136,7 +137,7 @@ MISTAKES = [
     ),
     (
         {"task.fitness": "sped"},
-        "task.fitness: expected measures, which are diameter, displacement_x,",
+        "task.fitness: expected measures, which are approach, brightness, diameter,",
     ),
     ({"name": "../up"}, "name: string should match pattern"),
     ({"seed.x": 1}, "seed: input should be a valid integer"),

@@ -9,7 +9,8 @@ from evolve.optimizers import NOBODY, OPTIMIZERS, Individuals, Optimizer
 from evolve.optimizers.selection import SelectionSettings, select
 from evolve.streams import Streams
 
-LEARNERS = [name for name in OPTIMIZERS if name != "random"]
+LEARNERS = [name for name in OPTIMIZERS if name not in ("random", "coevolution")]
+"""Two populations have no best of all: see test_coevolution."""
 SETTINGS = {"steady_state": {"living": 20}, "map_elites": {"bins": (4, 4)}}
 """What suits problems as small as these."""
 
@@ -34,9 +35,20 @@ class Vectors(ArrayGenomes):
         return np.abs(a - b).mean(axis=1)
 
 
+class Pairs(Vectors):
+    """Two populations in one genome."""
+
+    def split(self, genomes):
+        return genomes[:, :8], genomes[:, 8:]
+
+    def joined(self, first, second):
+        return np.concatenate([first, second], axis=1)
+
+
 def make(name: str, seed: int = 1, **settings) -> Optimizer:
     cls = OPTIMIZERS[name]
-    return cls(Vectors(), Streams(seed), cls.Settings(**{**SETTINGS.get(name, {}), **settings}))
+    encoding = Pairs() if name == "coevolution" else Vectors()
+    return cls(encoding, Streams(seed), cls.Settings(**{**SETTINGS.get(name, {}), **settings}))
 
 
 def sphere(genomes: np.ndarray) -> Scores:
