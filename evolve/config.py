@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BudgetConfig",
+    "LimitsConfig",
     "PerturbationConfig",
     "RunConfig",
     "SceneConfig",
@@ -115,6 +116,24 @@ class SecondLookConfig(PerturbationConfig):
     """Which of its perturbed trials counts: 0 the worst, 0.5 the median, 1 the best."""
 
 
+class LimitsConfig(configs.Section):
+    """What a robot may be and use; whoever exceeds a limit gets no fitness. None: no limit."""
+
+    mass: float | None = Field(None, gt=0.0)
+    """Of its body [kg]."""
+    diameter: float | None = Field(None, gt=0.0)
+    """Largest distance between two masses of the body at rest [m]."""
+    springs: int | None = Field(None, ge=1)
+    """Springs of its body."""
+    energy: float | None = Field(None, gt=0.0)
+    """Net work of its breathing springs during the measurement [J]."""
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The limits that there are: name of the measure -> largest value."""
+        return {name: value for name, value in self.model_dump().items() if value is not None}
+
+
 class TaskConfig(configs.Section):
     """What the robots have to do, and when they are believed."""
 
@@ -132,6 +151,7 @@ class TaskConfig(configs.Section):
     """How long they move before they are measured [cycles]."""
     measure: float = Field(4.0, gt=0.0)
     """How long they are measured [cycles]."""
+    limits: LimitsConfig = LimitsConfig()
     trials: TrialsConfig = TrialsConfig()
     second_look: SecondLookConfig = SecondLookConfig()
 

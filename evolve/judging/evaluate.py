@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evolve.config import RunConfig, SceneConfig
-from evolve.fitness import FITNESS, SAMPLES_PER_CYCLE, Trial
+from evolve.fitness import FITNESS, SAMPLES_PER_CYCLE, Trial, body_diameters
 from evolve.judging.scores import Scores
 from evolve.judging.second_look import SecondLook, quantile, share
 from evolve.judging.trials import aggregate, perturbed, scattered
@@ -39,6 +39,8 @@ class Evaluator:
         self.task = config.task
         self.descriptors = config.descriptors
         """Names of what is measured beside the fitness."""
+        self.measures = (config.task.fitness, *self.descriptors, *config.task.limits.given)
+        """Names of all that must be known of a trial."""
         self.simulation = config.simulation
         self.scene = config.scene.build()
         self._scenery = config.scene
@@ -104,7 +106,7 @@ class Evaluator:
         status = np.asarray(trial.measured.status, dtype=np.int64)
         found = {name: FITNESS[name](trial) for name in self.descriptors}
         return Scores(
-            fitness=FITNESS[self.task.fitness](trial),
+            fitness=self._fair(trial),
             status=status,
             descriptors={k: np.where(status == 0, v, np.nan) for k, v in found.items()},
             spring_evaluations=_costs(trial, simulation.robot_dt),
@@ -209,13 +211,26 @@ class Evaluator:
     def _fitness(self, trial: Trial) -> np.ndarray:
         """Fitness of every robot, shape (N,); NaN for those who were stopped."""
         stopped = np.asarray(trial.measured.status) != 0
-        return np.where(stopped, np.nan, FITNESS[self.task.fitness](trial))
+        return np.where(stopped, np.nan, self._fair(trial))
+
+    def _fair(self, trial: Trial) -> np.ndarray:
+        """What the task selects for, shape (N,); NaN for those beyond a limit.
+
+        So it is for bodies built into the ground, which would be shot out of it.
+        """
+        fitness = FITNESS[self.task.fitness](trial)
+        if self.scene.ground is not None:
+            fitness = np.where(_buried(trial.robots), np.nan, fitness)
+        for name, most in self.task.limits.given.items():
+            # Rounding must not decide about a body of exactly what is allowed.
+            fitness = np.where(FITNESS[name](trial) <= most * (1.0 + 1e-9), fitness, np.nan)
+        return fitness
 
     def _trial(
         self, simulation: ws.Simulation, robots: Sequence[ws.Robot], goal: Place | None
     ) -> Trial:
         """Run a trial; `robots` is whom to measure."""
-        used = [FITNESS[name] for name in (self.task.fitness, *self.descriptors)]
+        used = [FITNESS[name] for name in self.measures]
         energy = any(measure.needs_energy for measure in used)
         count = 1
         if any(measure.needs_path for measure in used):
@@ -268,6 +283,17 @@ def _rougher(scene: ws.Scene, factor: float) -> ws.Scene:
         name: factor * getattr(ground, name) for name in ("static_friction", "kinetic_friction")
     }
     return replace(scene, ground=replace(ground, **coefficients))
+
+
+def _buried(robots: Sequence[ws.Robot]) -> np.ndarray:
+    """Whether bodies as they were built reach below the ground, shape (N,) or for all, ()."""
+    import warp_springs as ws
+
+    if isinstance(robots, ws.Variants) and "positions" not in robots.stacked:
+        robots = [robots.body]
+    lowest = np.array([robot.positions[:, 2].min() for robot in robots])
+    buried = lowest < -1e-3 * body_diameters(robots)
+    return buried if len(buried) > 1 else buried[0]
 
 
 def _costs(trial: Trial, dt: np.ndarray) -> np.ndarray:
