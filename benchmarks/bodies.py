@@ -1,0 +1,180 @@
+"""Ragged generations: what it costs that every robot has a body of its own.
+
+    python -m benchmarks.bodies packing      # built and stepped, all different against all alike
+    python -m benchmarks.bodies genomes      # random genomes of every encoding, stepped 100 times
+    python -m benchmarks.bodies search       # body search against controllers of a fixed body
+
+Prints one JSON object a line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+import warp_springs as ws
+from evolve.encodings import ENCODINGS
+from evolve.search import Search
+from evolve.toml import load
+
+SCENE = ws.Scene(ground=ws.Ground(), damping=4.0)
+DT = 1e-3
+BATCH = 1000
+"""Genomes that are stepped together."""
+
+
+def different(n: int, springs: int, seed: int) -> list[ws.Robot]:
+    """Robots of about so many springs, no two of one topology."""
+    cls = ENCODINGS["voxels"]
+    encoding = cls(None, cls.Settings(cells=(4, 4, 3)))
+    found: dict[bytes, ws.Robot] = {}
+    for part in itertools.count():
+        rng = np.random.Generator(np.random.Philox([seed, part]))
+        for robot in encoding.express(encoding.random(512, rng)):
+            if abs(robot.n_springs - springs) <= 0.1 * springs:
+                found.setdefault(robot.topology, robot)
+        if len(found) >= n:
+            return list(found.values())[:n]
+    raise AssertionError
+
+
+def rate(robots: Sequence[ws.Robot], duration: float, repeats: int) -> tuple[float, float]:
+    """Spring evaluations per second, and seconds to build: the best of some repeats."""
+    stepped, built = [], []
+    for _ in range(repeats + 1):  # the first loads the kernels
+        started = time.perf_counter()
+        simulation = ws.Simulation(robots, SCENE, dt=DT, precision="float32")
+        built.append(time.perf_counter() - started)
+        started = time.perf_counter()
+        result = simulation.run(duration)
+        stepped.append(result.spring_evaluations / (time.perf_counter() - started))
+        assert np.isfinite(result.center_of_mass[np.asarray(result.status) == 0]).all()
+    return max(stepped[1:]), min(built[1:])
+
+
+def packing(options: argparse.Namespace) -> None:
+    """Throughput of all different against all alike, and the share of building in a second."""
+    robots = different(options.robots, options.springs, 1)
+    middle = min(robots, key=lambda robot: abs(robot.n_springs - options.springs))
+    steps = 1.0 + 1e-3 * np.arange(len(robots)) / len(robots)
+    alike = [middle.replace(stiffness=middle.stiffness * step) for step in steps]
+    _validate(robots[:32])
+    apart, built = rate(robots, options.duration, options.repeats)
+    together, built_alike = rate(alike, options.duration, options.repeats)
+    springs = sum(robot.n_springs for robot in robots)
+    simulating = springs / DT / apart
+    _say(
+        what="packing",
+        robots=len(robots),
+        topologies=len({robot.topology for robot in robots}),
+        springs_per_robot=springs / len(robots),
+        all_different_springs_per_s=apart,
+        one_topology_springs_per_s=together,
+        ratio=apart / together,
+        build_s=built,
+        build_alike_s=built_alike,
+        simulating_1_s_takes_s=simulating,
+        build_share=built / simulating,
+    )
+
+
+def _validate(robots: Sequence[ws.Robot]) -> None:
+    """Robots in a ragged batch end where they end alone, to the bit."""
+    together = ws.Simulation(robots, SCENE, dt=DT, precision="float32").run(0.05)
+    for i in (0, len(robots) // 2, len(robots) - 1):
+        alone = ws.Simulation([robots[i]], SCENE, dt=DT, precision="float32").run(0.05)
+        assert np.array_equal(alone.positions(0), together.positions(i)), i
+
+
+def genomes(options: argparse.Namespace) -> None:
+    """Random genomes of every encoding, crossed and mutated, each stepped 100 times."""
+    share = max(1, options.genomes // len(ENCODINGS))
+    for name, cls in ENCODINGS.items():
+        body = ws.shapes.lattice(2, 1, 1) if cls.needs_body else None
+        encoding, started = cls(body, cls.Settings()), time.perf_counter()
+        counts: dict[str, int] = {}
+        for first in range(0, share, BATCH):
+            rng = np.random.Generator(np.random.Philox([7, first]))
+            n = min(BATCH, share - first)
+            found = encoding.random(n, rng)
+            found = encoding.cross(found, encoding.take(found, rng.permutation(n)), rng)
+            robots = encoding.express(encoding.mutate(found, rng))
+            result = ws.Simulation(robots, SCENE, dt=DT, precision="float32").run(100 * DT)
+            for status in np.asarray(result.status).tolist():
+                key = ws.Status(status).name
+                counts[key] = counts.get(key, 0) + 1
+        seconds = time.perf_counter() - started
+        _say(what="genomes", encoding=name, genomes=share, seconds=seconds, statuses=counts)
+
+
+def search(options: argparse.Namespace) -> None:
+    """The best of body searches and of fixed-body searches on equal evaluations."""
+    common = {
+        "population": options.population,
+        "generations": options.generations,
+        "task.fitness": "steady",
+        "simulation.precision": "float32",
+    }
+    for name, seed in itertools.product(options.presets, range(1, options.seeds + 1)):
+        found = Search(load(name, common | {"seed": seed}))
+        while not found.finished:
+            found.step()
+        _say(
+            what="search",
+            preset=name,
+            fixed_body=found.config.fixed_body,
+            seed=seed,
+            evaluations=found.optimizer.evaluations,
+            steady=found.optimizer.best_fitness,
+            survivor=_survivor(found),
+        )
+        found.close()
+
+
+def _survivor(found: Search) -> float:
+    """Fitness of the best survivor of the last generation that passes the second look, or 0."""
+    from evolve.judging.evaluate import Evaluator
+
+    last = found.optimizer._survivors
+    look_at = np.argsort(-last.scores.worth)[:32]
+    robots = found.encoding.express(found.encoding.take(last.genomes, look_at))
+    fitness = last.scores.fitness[look_at]
+    look = Evaluator(found.config).second_look(list(robots), fitness)
+    return float(np.max(fitness[look.survives], initial=0.0))
+
+
+def _say(**row: object) -> None:
+    print(json.dumps(row), flush=True)
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
+    "packing": packing,
+    "genomes": genomes,
+    "search": search,
+}
+
+
+def main() -> None:
+    """Run one of the benchmarks."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("what", choices=COMMANDS)
+    parser.add_argument("--robots", type=int, default=2048)
+    parser.add_argument("--springs", type=int, default=300, help="of each robot, about")
+    parser.add_argument("--duration", type=float, default=0.1, help="simulated at a time [s]")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--genomes", type=int, default=1_000_000, help="over all encodings")
+    parser.add_argument("--presets", nargs="+", default=["creature", "critter", "walker", "cube"])
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--population", type=int, default=128)
+    parser.add_argument("--generations", type=int, default=40)
+    options = parser.parse_args()
+    COMMANDS[options.what](options)
+
+
+if __name__ == "__main__":
+    main()
