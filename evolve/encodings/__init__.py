@@ -16,6 +16,7 @@ from evolve.encodings.direct import DirectEncoding, DirectSettings
 from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
 from evolve.encodings.fourier import FourierEncoding, FourierSettings
 from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
+from evolve.encodings.lsystem import LsystemEncoding, LsystemSettings
 from evolve.encodings.morphology import MorphologyEncoding, MorphologySettings
 from evolve.encodings.neural import NeuralEncoding, NeuralSettings
 from evolve.encodings.regions import RegionsEncoding, RegionsSettings
@@ -44,6 +45,8 @@ __all__ = [
     "FourierSettings",
     "HarmonicsEncoding",
     "HarmonicsSettings",
+    "LsystemEncoding",
+    "LsystemSettings",
     "MorphologyEncoding",
     "MorphologySettings",
     "NeuralEncoding",
@@ -67,5 +70,6 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "cppn_body": CppnBodyEncoding,
     "controller": ControllerEncoding,
     "arena": ArenaEncoding,
+    "lsystem": LsystemEncoding,
 }
 """Name in the configuration -> class."""
