@@ -153,10 +153,10 @@ def _walk(
         if module.symbol in (PITCH, YAW, ROLL):
             turtle = turtle.turned(module.symbol, module.amount)
         elif module.symbol in (OPEN, TWIN):
+            if turtle.cell < 0:
+                continue  # there is nothing to branch off from yet: this is the trunk
             end = _closing(string, place)
             inside, place = string[place:end], end + 1
-            if turtle.cell < 0:
-                continue
             side = (UP, RIGHT, DOWN, LEFT)[int(module.amount) % 4]
             twins = module.symbol == TWIN and side in (LEFT, RIGHT)
             _walk(inside, turtle.branched(side, turtle.later), tissues, cells, moves)

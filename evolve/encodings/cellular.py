@@ -16,12 +16,12 @@ from evolve.encodings.evolving import BodySettings, EvolvingBody
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["PHASE", "TISSUE", "CellBody", "CellGenes", "CellSettings", "tissue"]
+__all__ = ["PHASE", "STIFFNESS", "TISSUE", "CellBody", "CellGenes", "CellSettings", "tissue"]
 
 TISSUE = 5
 """Genes of a tissue: rest length, swing, phase, stiffness, kind."""
-PHASE = 2
-"""Which of them goes round."""
+PHASE, STIFFNESS = 2, 3
+"""Two of them; the phase goes round."""
 
 
 class CellSettings(BodySettings):

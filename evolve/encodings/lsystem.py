@@ -10,8 +10,8 @@ from pydantic import Field
 
 from evolve.bodies.lsystem import CLOSE, OPEN, PITCH, ROLL, TWIN, YAW, Module, Production, rewrite
 from evolve.bodies.lsystem import build as walk
-from evolve.encodings.base import EncodingSettings
-from evolve.encodings.cellular import PHASE, TISSUE, CellGenes, CellSettings, tissue
+from evolve.encodings.base import EncodingSettings, folded
+from evolve.encodings.cellular import PHASE, STIFFNESS, TISSUE, CellGenes, CellSettings, tissue
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -85,11 +85,12 @@ class LsystemEncoding(CellGenes):
         """Change some genes, a tissue that the body has at least; at times insert or delete."""
         mutants = self.shifted(genomes, rng, self._named)
         for row, genome in enumerate(genomes):
-            used = [m.symbol for m in self.string(genome) if m.symbol in NAMES][:4] or ["A"]
-            name = NAMES.index(used[rng.integers(len(used))])
-            gene = self._ends[0] + name * TISSUE + (PHASE, 3)[rng.integers(2)]
-            moved = mutants[row, gene] + self.settings.mutation_step * (0.2 + rng.random())
-            mutants[row, gene] = moved - np.floor(moved)
+            used = [m.symbol for m in self.string(genome) if m.symbol in NAMES][:3] or ["A"]
+            # Only muscles have a phase, and only the first cell is sure to fit.
+            some = NAMES.index(used[rng.integers(len(used))]), NAMES.index(used[0])
+            gene = self._ends[0] + np.array(some) * TISSUE + [PHASE, STIFFNESS]
+            shift = 0.5 * self.settings.mutation_step * rng.standard_normal(2)
+            mutants[row, gene] = folded(mutants[row, gene] + shift, np.array([True, False]))
             if rng.random() < 0.3:
                 rules = mutants[row, : self._ends[0]].reshape(self._rules)
                 self._moved_on(rules[rng.integers(len(rules)), rng.integers(ALTERNATIVES)], rng)
