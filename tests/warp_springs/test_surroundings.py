@@ -149,3 +149,25 @@ def test_what_is_far_inside_an_obstacle_is_stopped():
 def test_the_classrooms_friction_is_for_a_flat_ground_alone():
     with pytest.raises(ValueError, match="flat ground alone"):
         ws.Scene(ground=ws.Ground(friction="course"), obstacles=ws.Plane())
+
+
+def test_hills_are_the_sum_of_their_waves():
+    waves = [(0.8, 0.3, 1.0, 1.0), (1.6, 2.0, 0.0, 0.5)]
+    field = ws.hills(waves, height=0.2, size=2.0, spacing=0.1)
+    assert field.heights.max() == 0.0 and field.heights.min() == pytest.approx(-0.2)
+    x, y = np.meshgrid(np.linspace(-1, 1, 21), np.linspace(-1, 1, 21), indexing="ij")
+    shape = sum(
+        weight * long * np.sin(2 * np.pi * (x * np.cos(turn) + y * np.sin(turn)) / long + phase)
+        for long, turn, phase, weight in waves
+    )
+    steps = np.diff(field.heights.ravel()) / np.diff(shape.ravel())
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
+    assert field.origin == (-1.0, -1.0, 0.0)
+
+
+def test_rough_terrain_follows_from_its_seed():
+    one, again, other = (ws.rough_terrain(seed, height=0.1) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(one.heights, again.heights)
+    assert np.abs(one.heights - other.heights).max() > 0.02
+    with pytest.raises(ValueError, match="shorter than two grid points"):
+        ws.rough_terrain(1, feature=0.15)
