@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import pytest
+import warp as wp
 
 from benchmarks import cuda_static
 from warp_springs.engine.layouts import BLOCK_SIZES
+from warp_springs.kernels.control import control
 from warp_springs.kernels.traits import Traits
 
 CASES = [
@@ -85,3 +87,10 @@ def test_the_table_has_a_line_for_every_row(tmp_path):
     assert len(lines) == 3
     assert f"{row['instructions_per_spring']:.1f}" in lines[1]
     assert row["memory_limit"] == pytest.approx(2.039e12 / 24)
+
+
+@pytest.mark.parametrize(("precision", "obstacles"), [("float32", 2), ("mixed", 0)])
+def test_controllers_compile(precision, obstacles, tmp_path):
+    module = control(precision, not obstacles, obstacles).module
+    (path,) = wp.compile_aot_module(module, arch=[90], module_dir=tmp_path, use_ptx=False)
+    assert "set_muscles" in cuda_static.resources(path)
