@@ -205,7 +205,8 @@ class Batch:
             for index, robot in enumerate(robots):
                 strip = Strip.alike([index], [robot])
                 traits = replace(traits_of(robot.elements), colliding=True)
-                strips[1, bool(breathes(strip)[0]), "lanes", traits].append(strip)
+                layout = self._layout_of(robot.n_masses)
+                strips[1, bool(breathes(strip)[0]), layout, traits].append(strip)
             return strips
         alone: dict[bool, list[int]] = defaultdict(list)
         gathered: list[Strip] = []

@@ -19,7 +19,6 @@ from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_na
 from warp_springs.engine.method import AUTO_DT, Method
 from warp_springs.engine.packing import aligned
 from warp_springs.engine.slices import Tape, cut, run_all
-from warp_springs.engine.support import needs_lanes
 from warp_springs.engine.worlds import Member, gathered, on_a_grid
 from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of
 from warp_springs.kernels.law import EVALUATIONS
@@ -106,10 +105,6 @@ class Simulation:
             _check_count("threads", threads)
         check_choice("layout", layout, LAYOUTS)
         place = device_named(device)
-        needs = needs_lanes(self.robots, self.scene)
-        if needs and (layout not in ("auto", "lanes") or not place.is_cpu):
-            raise NotImplementedError(f"{needs}: for the layout 'lanes' on a CPU so far")
-        layout = "lanes" if needs else layout
         check_layout(layout, place, precision, [robot.n_masses for robot in _bodies(self.robots)])
         self.dt, self.device, self.layout = AUTO_DT if auto else float(dt), place.alias, layout
         self.precision, self.integrator = precision, integrator

@@ -46,15 +46,13 @@ SPECIAL = Traits(
 
 
 @pytest.mark.parametrize(
-    ("layout", "precision", "spills"),
-    # All at once, and the ledger, are a little more than the registers of 384 threads hold.
-    [("block", "float32", 0), ("block", "float64", 128), ("flat", "mixed", 0)],
+    ("layout", "precision"), [("block", "float32"), ("block", "float64"), ("flat", "mixed")]
 )
-def test_elements_of_every_kind_compile_and_hardly_spill(layout, precision, spills, tmp_path):
+def test_elements_of_every_kind_compile_without_spills(layout, precision, tmp_path):
     about = replace(cuda_static.features(layout, precision, "walking", ledger=True), traits=SPECIAL)
     path = cuda_static.compiled(about, 90, BLOCK_SIZES[precision][-1], tmp_path)
     used = cuda_static.resources(path)
-    assert max(row["spilled"] for row in used.values()) <= spills
+    assert {name: row["spilled"] for name, row in used.items() if row["spilled"]} == {}
     steps = {"advance"} if layout == "block" else {"kick_rates", "last_kick_middle", "find"}
     assert steps <= used.keys()
 

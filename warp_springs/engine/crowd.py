@@ -33,6 +33,7 @@ from warp_springs.engine.packing import aligned
 from warp_springs.kernels.block import BLOCK, block
 from warp_springs.kernels.buffers import BUNDLE, SEEN, real_dtype, structs
 from warp_springs.kernels.bundle import CHECK_EVERY
+from warp_springs.kernels.crowd_collisions import FEATURE
 from warp_springs.kernels.flat import launches, threads
 from warp_springs.kernels.gather import (
     CHUNK,
@@ -49,6 +50,8 @@ __all__ = ["Blocks", "Crowd", "Launches", "Threads", "crowds"]
 
 #: Threads have this many slices each, or they would wait more than they work.
 SLICES_PER_THREAD = 16
+#: Threads of a GPU that fit the tree of one robot's features.
+TEAM = 256
 
 
 def crowds(
@@ -113,6 +116,7 @@ class Crowd:
         self._given = {
             "slots": self._slots,
             "robots": self._robots,
+            "team": 1 if self.device.is_cpu else TEAM,
             "run": self._run(batch, about),
             **self._structs(arrays(bodies, self._lists, self.features)),
         }
@@ -164,6 +168,8 @@ class Crowd:
             "sites": self._slots // (features.width if features.vector else 1),
             "chunks": len(self._given["model"].chunks) // len(CHUNK),
             "robots": self._robots,
+            "teams": self._robots * self._given["team"],
+            "features": len(self._given["model"].features) // len(FEATURE),
         }
 
     def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
@@ -333,7 +339,7 @@ class Launches(Crowd):
         kernels = launches(features)
         sizes = self._sizes(features)
         return (
-            [self._recorded(kernel, self._slots) for kernel in kernels.steps],
+            [self._recorded(kernel, sizes[over]) for kernel, over in kernels.steps],
             [self._recorded(kernel, sizes[over]) for kernel, over in kernels.check],
             self._recorded(kernels.tick, 1),
         )

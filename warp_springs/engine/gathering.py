@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warp_springs.engine.crowd_colliding import collision_arrays
+from warp_springs.engine.curve import along_curve as place_on_curve
+from warp_springs.engine.curve import ranges
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE
 from warp_springs.kernels.gather import GatherFeatures, lane_order
 
@@ -23,12 +26,6 @@ WINDOW = 512
 CHUNK_SLOTS = 256
 #: What stepping changes of springs with limits: where a bundle keeps it, and what whole ones have.
 WEAR = {"worn": ("worn", [0.0, 1.0]), "broken_at": ("broken", [np.nan])}
-
-
-def ranges(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """All of ``start, start + 1, ...``, ``count`` numbers for each start, one after the other."""
-    first = np.cumsum(counts) - counts
-    return np.arange(counts.sum()) + np.repeat(starts - first, counts)
 
 
 @dataclass(frozen=True)
@@ -163,12 +160,7 @@ def _curve(bodies: Bodies, first: np.ndarray, topology: np.ndarray) -> np.ndarra
     high = np.maximum.reduceat(positions, first, axis=0)[topology]
     extent = (high - low).max(axis=1, keepdims=True)
     share = (positions - low) / np.where(extent > 0.0, extent, 1.0)
-    grid = (1023.0 * np.clip(np.nan_to_num(share, posinf=1.0), 0.0, 1.0)).astype(np.int64)
-    code = np.zeros(len(grid), np.int64)
-    for axis in range(3):
-        for bit in range(10):
-            code |= ((grid[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code
+    return place_on_curve(share)
 
 
 def _lists(bodies: Bodies, slot, start, padded, features: GatherFeatures):
@@ -237,6 +229,8 @@ def arrays(bodies: Bodies, lists: Lists, features: GatherFeatures) -> dict[str, 
         mixed["quanta"] = bodies.values("quanta", "lane", one)
         mixed["origins"] = bodies.buffers["origins"][ranges(3 * table["lane"], 3 * one)]
         mixed["shifts"] = np.zeros(3 * n)
+    if traits.colliding:
+        own |= collision_arrays(bodies, lists)
     waves = bodies.buffers["oscillators"][ranges(4 * table["lane"], 4 * one)].reshape(n, 4)
     return {
         "robots": np.stack(robots, axis=1),

@@ -9,7 +9,7 @@ from warp_springs.body.variants import Variants
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 
-__all__ = ["elements_of", "needs_lanes", "refuse_unsupported"]
+__all__ = ["elements_of", "refuse_unsupported"]
 
 
 def elements_of(robots: Sequence[Robot]) -> list[Elements]:
@@ -18,18 +18,13 @@ def elements_of(robots: Sequence[Robot]) -> list[Elements]:
     return [robot.elements for robot in some if robot.elements is not NONE]
 
 
-def needs_lanes(robots: Sequence[Robot], scene: Scene) -> str:
-    """What only the layout "lanes" can do here, in words; empty if nothing."""
-    return "Scene.collisions" if scene.collisions is not None else ""
-
-
 def refuse_unsupported(robots: Sequence[Robot], scene: Scene, precision: str) -> None:
     """Raise NotImplementedError for what the kernels cannot simulate."""
-    placed = bool(scene.obstacles) or scene.collisions is not None
+    placed = bool(scene.obstacles)
     for elements in elements_of(robots):
         placed |= len(elements.bonds) > 0 or len(elements.tethers) > 0
     if placed and precision == "mixed":
         raise NotImplementedError(
             "precision: 'mixed' counts positions from a moving origin, and knows no obstacles, "
-            "collisions, constraints or tethers; use 'float64' or 'float32'"
+            "constraints or tethers; use 'float64' or 'float32'"
         )

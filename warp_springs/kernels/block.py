@@ -62,9 +62,39 @@ auto find_rates = [&](bool shifted, scalar time, bool start) {
     if (moving) middle_slot(at, now(), then(), low, sine, cosine, time, shifted);
     meet();
 };
+#if COLLIDES
+const int last_robot = mine[2] + robots_here - 1;
+const int first_feature = meeting_row(mine[2])[0];
+const int past_feature = meeting_row(last_robot)[0] + meeting_row(last_robot)[7];
+auto base_of = [=](int r) -> int { return model.robots.data[r * ROBOT_COLUMNS] - first_slot; };
+auto collide = [&](scalar time, bool rubs) {
+    int* const flag = state.stale.data + robot;
+    if (is_mass) {
+        store_sum(state.velocities.data, state.low_velocities.data, outside, velocity);
+        raise(flag, has_left(now(), at.base, robot, slot));
+    }
+    meet();
+    for (int r = mine[2]; r <= last_robot; ++r) {
+        if (!*(volatile int*)(state.stale.data + r)) continue;
+        fit_tree(now(), r, base_of(r), thread, THREADS, meet);
+    }
+    const bool stale = is_mass && *(volatile int*)flag;
+    if (stale) remember(now(), at.base, robot, slot);
+    for (int f = first_feature + thread; f < past_feature; f += THREADS)
+        if (*(volatile int*)(state.stale.data + feature_row(f)[0])) list_near(f);
+    meet();
+    if (leader) *flag = 0;
+    for (int f = first_feature + thread; f < past_feature; f += THREADS)
+        push_feature(f, now(), base_of(feature_row(f)[0]), time, rubs);
+    meet();
+};
+#else
+auto collide = [](scalar, bool) {};
+#endif
 auto move = [&](bool shifted, scalar time, bool start, bool last) {
     if (LIMITS && moving && !shifted) wear_slot(at, now(), sine, cosine);
     find_rates(shifted, time, start);
+    collide(time, true);
     if (moving)
         move_slot(at, now(), then(), low, velocity, rest, sine, cosine, shifted, time, start, last);
     flip();
@@ -72,6 +102,7 @@ auto move = [&](bool shifted, scalar time, bool start, bool last) {
 auto kick_and_drift = move;
 auto euler = [&]() { move(false, dt, false, true); };
 auto gradient_shift = [&]() {
+    collide(GRADIENT_KICK, false);
     if (moving) shift_slot(at, now(), then(), low, sine, cosine);
     flip();
 };

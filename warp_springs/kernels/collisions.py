@@ -9,9 +9,13 @@ thickness and a margin of each other, and is looked up anew once a mass has move
 margin. More pairs than the list holds are looked at one by one.
 """
 
+from warp_springs.kernels.contact import CONTACT
+
 __all__ = ["COLLIDING"]
 
-COLLIDING = r"""
+COLLIDING = (
+    CONTACT
+    + r"""
 const int* const triangle = model.triangles.data + triangle_;
 const int* const edge = model.edges.data + edge_;
 const int* const body = model.bodies.data + body_;
@@ -23,15 +27,8 @@ const scalar* const contact = model.contacts.data + contact_;  // see warp_sprin
 const int T = (int)triangles_, E = (int)edges_, CAPACITY = (int)capacity_;
 real collision_energy = zero, rub_power = zero, soft_power = zero;
 
-struct Point { scalar x, y, z; };
 auto point_at = [](const Vec* x, int i) -> Point {
     return Point{x[i].x[0], x[i].y[0], x[i].z[0]};
-};
-auto minus = [](Point a, Point b) -> Point { return Point{a.x - b.x, a.y - b.y, a.z - b.z}; };
-auto grown = [](Point a, scalar s) -> Point { return Point{a.x * s, a.y * s, a.z * s}; };
-auto inner = [](Point a, Point b) -> scalar { return a.x * b.x + a.y * b.y + a.z * b.z; };
-auto within_unit = [](scalar a) -> scalar {
-    return a > scalar(0) ? (a < scalar(1) ? a : scalar(1)) : scalar(0);
 };
 
 // Do two masses belong together: the same, or joined by a spring?
@@ -120,7 +117,7 @@ auto list_pairs = [&](const Vec* x) {
         listed_x[3 * i] = p.x; listed_x[3 * i + 1] = p.y; listed_x[3 * i + 2] = p.z;
     }
 };
-auto refresh_pairs = [&](const Vec* x) {
+auto list_is_stale = [=](const Vec* x) -> bool {
     const scalar half_margin = contact[0] * scalar(0.5), limit = half_margin * half_margin;
     bool stale = pair_list[0] < 0;
     for (int i = 0; i < M && !stale; ++i) {
@@ -128,122 +125,40 @@ auto refresh_pairs = [&](const Vec* x) {
         const Point way = minus(point_at(x, i), then);
         stale = !(inner(way, way) <= limit);
     }
-    if (stale) list_pairs(x);
-};
-
-// The weights of the point of a triangle, or of a segment, that is nearest to p.
-auto nearest_on_segment = [=](Point p, Point a, Point b, scalar* weights) {
-    const Point ab = minus(b, a);
-    const scalar length2 = inner(ab, ab);
-    const scalar along = inner(minus(p, a), ab);
-    const scalar t = length2 > scalar(0) ? within_unit(along / length2) : scalar(0);
-    weights[0] = scalar(1) - t; weights[1] = t;
-};
-auto nearest_on_triangle = [=](Point p, const Point* corner, scalar* weights) {
-    const Point ab = minus(corner[1], corner[0]), ac = minus(corner[2], corner[0]);
-    const Point ap = minus(p, corner[0]);
-    const scalar g00 = inner(ab, ab), g01 = inner(ab, ac), g11 = inner(ac, ac);
-    const scalar r0 = inner(ab, ap), r1 = inner(ac, ap), det = g00 * g11 - g01 * g01;
-    if (det > scalar(0)) {
-        const scalar u = (g11 * r0 - g01 * r1) / det, v = (g00 * r1 - g01 * r0) / det;
-        if (u >= scalar(0) && v >= scalar(0) && u + v <= scalar(1)) {
-            weights[0] = scalar(1) - u - v; weights[1] = u; weights[2] = v;
-            return;
-        }
-    }
-    scalar best = 0;
-    for (int side = 0; side < 3; ++side) {
-        const int i = side, j = (side + 1) % 3;
-        scalar w[2];
-        nearest_on_segment(p, corner[i], corner[j], w);
-        const Point q = {corner[i].x * w[0] + corner[j].x * w[1],
-                         corner[i].y * w[0] + corner[j].y * w[1],
-                         corner[i].z * w[0] + corner[j].z * w[1]};
-        const Point d = minus(p, q);
-        const scalar far = inner(d, d);
-        if (side == 0 || far < best) {
-            best = far;
-            weights[0] = weights[1] = weights[2] = scalar(0);
-            weights[i] = w[0]; weights[j] = w[1];
-        }
-    }
-};
-auto nearest_of_segments = [=](const Point* a, const Point* b, scalar* wa, scalar* wb) {
-    const Point u = minus(a[1], a[0]), v = minus(b[1], b[0]), r = minus(a[0], b[0]);
-    const scalar uu = inner(u, u), vv = inner(v, v), uv = inner(u, v);
-    const scalar ur = inner(u, r), vr = inner(v, r), det = uu * vv - uv * uv;
-    scalar s = det > uu * vv * scalar(1e-12) ? within_unit((uv * vr - vv * ur) / det)
-                                            : scalar(0.5);
-    scalar t = vv > scalar(0) ? within_unit((uv * s + vr) / vv) : scalar(0);
-    s = uu > scalar(0) ? within_unit((uv * t - ur) / uu) : scalar(0);
-    wa[0] = scalar(1) - s; wa[1] = s;
-    wb[0] = scalar(1) - t; wb[1] = t;
+    return stale;
 };
 
 // The temporary spring of a pair, if it is there: forces on its masses into F.
 auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs) {
-    int masses[6];
-    scalar weights[6];
-    Point at[6];
-    const int m = masses_of(f, masses), n = masses_of(g, masses + m);
-    for (int c = 0; c < m + n; ++c) at[c] = point_at(x, masses[c]);
-    weights[0] = scalar(1);
-    if (m == 1) nearest_on_triangle(at[0], at + 1, weights + 1);
-    else nearest_of_segments(at, at + 2, weights, weights + 2);
-    Point d = {};  // from the second feature to the first
-    for (int c = 0; c < m + n; ++c) {
-        if (c >= m) weights[c] = -weights[c];
-        d.x += at[c].x * weights[c]; d.y += at[c].y * weights[c]; d.z += at[c].z * weights[c];
-    }
-    const scalar far2 = inner(d, d), thickness = contact[0];
-    if (!(far2 < thickness * thickness) || !(far2 > TINY)) return;
-    const scalar far = square_root(zero + far2)[0];
-    const Point normal = grown(d, scalar(1) / far);
-    const scalar depth = thickness - far, k = contact[1];
-    collision_energy += k * depth * depth * scalar(0.5);
-    scalar push = k * depth;
-    Point force = grown(normal, push);
-    if (rubs) {
-        Point u = {};
-        scalar inverse = 0;
-        for (int c = 0; c < m + n; ++c) {
-            const Vec speed = v[masses[c]];
-            u.x += speed.x[0] * weights[c]; u.y += speed.y[0] * weights[c];
-            u.z += speed.z[0] * weights[c];
-            inverse += w[masses[c]][0] * weights[c] * weights[c];
-        }
-        const scalar rate = inner(u, normal);
-        const scalar damping = scalar(2) * contact[4] * square_root(zero + k / inverse)[0];
-        scalar softer = -damping * rate;
-        if (push + softer < scalar(0)) softer = -push;  // it never pulls
-        soft_power -= softer * (rate + softer * inverse * time * scalar(0.5));
-        const Point slip = minus(u, grown(normal, rate));
-        const scalar speed = square_root(zero + inner(slip, slip))[0];
-        // A quarter of what would stop the slip at once: a mass has several such springs.
-        const scalar stop = speed / (inverse * time) * scalar(0.25), load = push + softer;
-        const scalar rub = stop <= contact[2] * load ? stop
-            : contact[3] * load < stop ? contact[3] * load : stop;
-        rub_power += rub * (speed - rub * inverse * time * scalar(0.5));  // at the mean speed
-        const scalar along = speed > scalar(0) ? rub / speed : scalar(0);
-        force = Point{normal.x * load - slip.x * along, normal.y * load - slip.y * along,
-                      normal.z * load - slip.z * along};
-    }
-    for (int c = 0; c < m + n; ++c) {
+    int masses[4];
+    Point at[4];
+    const int m = masses_of(f, masses);
+    masses_of(g, masses + m);
+    for (int c = 0; c < 4; ++c) at[c] = point_at(x, masses[c]);
+    Push pair;
+    auto speed_of = [&](int c) -> Point { return point_at(v, masses[c]); };
+    auto inverse_of = [&](int c) -> scalar { return w[masses[c]][0]; };
+    if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, pair)) return;
+    collision_energy += pair.energy;
+    rub_power += pair.rub;
+    soft_power += pair.soft;
+    for (int c = 0; c < 4; ++c) {
         Vec& f_here = F[masses[c]];
-        f_here.x += force.x * weights[c];
-        f_here.y += force.y * weights[c];
-        f_here.z += force.z * weights[c];
+        f_here.x += pair.force.x * pair.weights[c];
+        f_here.y += pair.force.y * pair.weights[c];
+        f_here.z += pair.force.z * pair.weights[c];
     }
 };
 // All temporary springs with the masses at x, for a kick of `time`; `rubs`: with losses.
-// `listed`: by the list of candidates, which looks it up anew if need be; a look at the robots does
-// without, so that it changes nothing.
+// `listed`: by the list of candidates, which is looked up anew if need be; a look at the robots
+// takes it only if it still holds, so that it changes nothing.
 auto collide = [&](const Vec* x, scalar time, bool rubs, bool listed) {
-    if (listed) refresh_pairs(x);
+    const bool stale = list_is_stale(x);
+    if (listed && stale) list_pairs(x);
     collision_energy = rub_power = soft_power = zero;
     const int count = pair_list[0], n = M + T + E;
     const int* const pairs = pair_list + 1 + n;
-    if (listed && count <= CAPACITY) {
+    if ((listed || !stale) && count <= CAPACITY) {
         for (int e = 0; e < count; ++e) push_pair(x, pairs[2 * e], pairs[2 * e + 1], time, rubs);
         return;
     }
@@ -257,3 +172,4 @@ auto enter_collisions = [&](scalar time) {
     ledger[5] += soft_power * time;
 };
 """
+)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import warp as wp
 
 from warp_springs.kernels.bundle import STEPS
+from warp_springs.kernels.crowd_collisions import COLLISION_JOBS
 from warp_springs.kernels.gather import GatherFeatures, gather_structs, passes, run_type
 
 __all__ = ["JOBS", "Launches", "launches", "threads"]
@@ -89,9 +90,34 @@ auto find_rates = [&](bool shifted, scalar time, bool start) {
     });
     meet();
 };
+#if COLLIDES
+const int features = meeting_row(0)[7];
+auto collide = [&](scalar time, bool rubs) {
+    bool left = false;
+    for (int slot = first_slice * W; slot < past_slice * W; ++slot)
+        left = left || (model.touch_rows.data[slot] < model.touch_rows.data[slot + 1]
+                        && has_left(now(), 0, robot, slot));
+    raise(state.stale.data, left);
+    meet();
+    const int part = (features + threads - 1) / threads;
+    const int from = part * thread, to = from + part < features ? from + part : features;
+    if (__atomic_load_n(state.stale.data, __ATOMIC_ACQUIRE)) {
+        for (int slot = first_slice * W; slot < past_slice * W; ++slot)
+            remember(now(), 0, robot, slot);
+        fit_tree(now(), robot, 0, thread, threads, meet);
+        for (int f = from; f < to; ++f) list_near(f);
+        if (leader) *state.stale.data = 0;
+    }
+    for (int f = from; f < to; ++f) push_feature(f, now(), 0, time, rubs);
+    meet();
+};
+#else
+auto collide = [](scalar, bool) {};
+#endif
 auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__((always_inline)) {
     if (LIMITS && !shifted) slices([&](Slot at) { wear_slot(at, now(), sine, cosine); });
     find_rates(shifted, time, start);
+    collide(time, true);
     slices([&](Slot at) __attribute__((always_inline)) {
         Vec low = low_at(at);
         Sum v = velocity_at(at);
@@ -106,6 +132,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last) {
 };
 auto euler = [&]() { move(false, dt, false, true); };
 auto gradient_shift = [&]() {
+    collide(GRADIENT_KICK, false);
     slices([&](Slot at) __attribute__((always_inline)) {
         shift_slot(at, now(), then(), low_at(at), sine, cosine);
     });
@@ -301,6 +328,17 @@ if (!moving) return;
 middle_slot(at, now, then, low_at(at), sine, cosine, time, shifted);
 """
 
+# The temporary springs before a pass.
+_COLLIDE = r"""
+const long long n = clock.data[0] + offset;
+const scalar* const where = state.positions.data + ((n + PASS) & 1) * (4 * (long long)slots);
+const scalar time = EULER ? dt : PASS ? GRADIENT_KICK
+    : n == 0 ? FIRST_KICK : FIRST_KICK * scalar(2);
+const bool rubs = PASS != 1;
+const int index = slot;
+auto takes_part = [=](int robot) -> bool { return state.states.data[robot] == 0; };
+"""
+
 _FIND = r"""
 if (stopped) return;
 const scalar* const now = state.positions.data + (n & 1) * buffer;
@@ -363,12 +401,12 @@ class Launches(NamedTuple):
     """Kernels of one set of features.
 
     Attributes:
-        steps: The passes of a step, in order, over slots.
-        check: What is done every ``CHECK_EVERY`` steps, in order, and what each is launched over.
+        steps: The passes of a step, in order, and what each is launched over.
+        check: The same for what is done every ``CHECK_EVERY`` steps.
         tick: Moves the clock on.
     """
 
-    steps: list[wp.Kernel]
+    steps: list[tuple[wp.Kernel, str]]
     check: list[tuple[wp.Kernel, str]]
     tick: wp.Kernel
 
@@ -392,6 +430,7 @@ def launches(features: GatherFeatures) -> Launches:
             robots: int,
             clock: wp.array(dtype=wp.int64),
             sums: wp.array(dtype=wp.float64),
+            team: int,
             offset: int,
             slot: int,
         ): ...
@@ -405,9 +444,10 @@ def launches(features: GatherFeatures) -> Launches:
             robots: int,
             clock: wp.array(dtype=wp.int64),
             sums: wp.array(dtype=wp.float64),
+            team: int,
             offset: int,
         ):
-            work(model, state, run, slots, robots, clock, sums, offset, wp.tid())
+            work(model, state, run, slots, robots, clock, sums, team, offset, wp.tid())
 
         return launch
 
@@ -422,10 +462,17 @@ def launches(features: GatherFeatures) -> Launches:
     for index, (job, integrators) in enumerate(JOBS.items()):
         if features.integrator not in integrators:
             continue
-        within = f"const int PASS = {index};\n" + _LAUNCHES + _WITHIN
+        number = f"const int PASS = {index};\n"
+        within = number + _LAUNCHES + _WITHIN
         if job != "shift":
-            steps += [kernel(f"{job}_{name}", within + snippet) for name, snippet in damped.items()]
-        steps.append(kernel(job, within + _PASS))
+            steps += [
+                (kernel(f"{job}_{name}", within + snippet), "slots")
+                for name, snippet in damped.items()
+            ]
+        if features.traits.colliding:
+            for name, (over, snippet) in COLLISION_JOBS.items():
+                steps.append((kernel(f"{name}_{job}", number + _COLLIDE + snippet), over))
+        steps.append((kernel(job, within + _PASS), "slots"))
     check = [
         (kernel("find", _LAUNCHES + _FIND), "slots"),
         (kernel("settle", _LAUNCHES + _SETTLE), "slots"),

@@ -33,6 +33,7 @@ from warp_springs.kernels.buffers import (
     struct_of,
 )
 from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
+from warp_springs.kernels.crowd_collisions import CROWD_COLLIDING, NO_CROWD_COLLIDING
 from warp_springs.kernels.dialect import (
     native_width,
     scalar_dialect,
@@ -107,6 +108,15 @@ MODEL = {
     "outer_windows": np.float64,  # [row][2][slot], s
     "skins": REAL,  # [slice][3][slot]
     "bonds": REAL,  # [slice][10][slot]
+    # For collisions, see kernels.crowd_collisions.
+    "features": np.int32,
+    "meetings": np.int32,
+    "leaf_features": np.int32,  # the leaves of the trees, -1 for padding
+    "near_rows": np.int32,
+    "nears": np.int32,
+    "contacts": REAL,  # see warp_springs.engine.colliding
+    "touch_rows": np.int32,  # where the features of the mass in each slot begin
+    "touches": np.int32,  # three times the feature, plus its corner
     "quanta": REAL,  # in which the origin of a robot moves, m; in mixed precision
 }
 #: What stepping changes.
@@ -132,6 +142,13 @@ STATE = {
     "broken_at": np.float64,  # of each end, s
     "rates": REAL,  # quads: what the dashpots see of the velocities as a kick begins, m/s
     "middle_rates": REAL,  # and in the middle of it
+    "boxes": REAL,  # [node][6]
+    "partners": np.int32,  # [feature][ROOM]
+    "partner_counts": np.int32,
+    "fitted_positions": REAL,  # quads, where the trees were fitted
+    "stale": np.int32,  # whether the tree of each robot must be fitted anew
+    "touched": np.int32,  # whether each feature touches another
+    "feature_forces": REAL,  # forces on its masses [3][3], energy, power of its two losses
     "states": np.int32,  # Status
     "state_times": np.float64,  # s
     "flags": np.int32,  # reasons to stop a robot, found by the check; and by a look
@@ -205,7 +222,16 @@ def passes(features: GatherFeatures) -> str:
         loads = vector_loads(features.width)
     else:
         dialect, loads = scalar_dialect(features.precision), SCALAR_LOADS
-    return dialect + flags + "\n".join(lines) + _ORIGIN + LAW + SLOT + loads + ENDS + SLOT_PASSES
+    colliding = CROWD_COLLIDING if features.traits.colliding else NO_CROWD_COLLIDING
+    slots = SLOT_PASSES.replace(_COLLISIONS, colliding)
+    collides = f"#define COLLIDES {int(features.traits.colliding)}\n"
+    return (
+        collides + dialect + flags + "\n".join(lines) + _ORIGIN + LAW + SLOT + loads + ENDS + slots
+    )
+
+
+# Where collisions have their place in the text.
+_COLLISIONS = "// collisions\n"
 
 
 _TABLES = {"robot": ROBOT, "site": SITE, "chunk": CHUNK}

@@ -1,8 +1,9 @@
 """A look at a crowd, for every layout that gathers: it changes nothing.
 
 Kernels in turn: the reasons to stop a robot; the positions that are shown, good ones for a stopped
-robot; what dashpots see, where there are any; what each mass contributes; sums over runs of slots;
-sums over robots. The sums are taken in float64, in an order that depends on the robot alone.
+robot; what dashpots see, where there are any; the temporary springs of collisions; what each mass
+contributes; sums over runs of slots; sums over robots. The sums are taken in float64, in an order
+that depends on the robot alone.
 """
 
 import functools
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import warp as wp
 
 from warp_springs.kernels.buffers import real_type, structs
+from warp_springs.kernels.crowd_collisions import COLLISION_JOBS
 from warp_springs.kernels.flat import CPU_OPTIONS
 from warp_springs.kernels.gather import LOOKS, GatherFeatures, gather_structs, passes, run_type
 
@@ -41,6 +43,14 @@ if (stopped) a = load(state.good_positions.data, at);
 keep_quad(shown.data, at, a, w);
 """
 
+# Trees and lists of neighbours may be made anew: that changes no motion.
+_COLLIDE = r"""
+const scalar* const where = shown.data;
+const scalar time = FIRST_KICK;
+const bool rubs = step > 0;
+auto takes_part = [=](int robot) -> bool { return wanted.data[robot] != 0; };
+"""
+
 # A mass at the instant of the look.
 _SEEN = r"""
 real w;
@@ -68,10 +78,11 @@ if (kicked) middle_slot(at, shown.data, nullptr, low, sine, cosine, FIRST_KICK, 
 _LOOK = r"""
 const Own own = own_of(at, a, nullptr);
 const scalar* const rates = DASHPOTS && kicked ? state.middle_rates.data : nullptr;
-const Force sum = gather(at, shown.data, a, sine, cosine, rates);
+Force sum = gather(at, shown.data, a, sine, cosine, rates);
 Sum v = u;
 Losses losses = {};
 Accounts accounts = open_accounts(stopped ? state.good_ledgers.data : state.ledgers.data, at);
+touches_of(at, sum, accounts, FIRST_KICK, kicked && !stopped);
 if (kicked) synchronise(v, sum.f, in_world(x), w, own, losses);
 if (LEDGER && !stopped) {
     enter(accounts.values, losses, u, v, w);
@@ -94,7 +105,7 @@ else if (LEDGER)
     });
 const real m = (zero + scalar(1)) / w;
 const real energies[4] = {kinetic_energy(v, m), gravity_energy(in_world(x), m), springs,
-                          contact_energy(in_world(x), own)};
+                          contact_energy(in_world(x), own) + touch_energy(at)};
 Vec parts_of_x[2] = {}, parts_of_v[2] = {};
 keep_sum(parts_of_x, parts_of_x + 1, 0, x);
 keep_sum(parts_of_v, parts_of_v + 1, 0, v);
@@ -202,6 +213,7 @@ def look(features: GatherFeatures) -> Look:
             parts: wp.array(dtype=wp.float64),
             sums: wp.array(dtype=wp.float64),
             seen: Seen,
+            team: int,
             index: int,
         ): ...
 
@@ -215,6 +227,7 @@ def look(features: GatherFeatures) -> Look:
             side: int,
             step: wp.int64,
             wanted: wp.array(dtype=wp.int32),
+            team: int,
             # outputs
             shown: wp.array(dtype=real),
             parts: wp.array(dtype=wp.float64),
@@ -234,20 +247,22 @@ def look(features: GatherFeatures) -> Look:
                 parts,
                 sums,
                 seen,
+                team,
                 wp.tid(),
             )
 
         return launch
 
-    over_sites = {"find": _FIND, "show": _SHOW}
+    jobs = {"find": ("sites", _SITE + _FIND), "show": ("sites", _SITE + _SHOW)}
     if features.traits.dashpots and features.integrator != "euler":
-        over_sites |= {"rates": _SEEN + _RATES, "middle": _SEEN + _MIDDLE}
-    over_sites["look"] = _SEEN + _LOOK
-    return Look(
-        [
-            *(kernel(name, _SITE + snippet) for name, snippet in over_sites.items()),
-            kernel("add", _ADD),
-            kernel("report", _REPORT),
-        ],
-        [*["sites"] * len(over_sites), "chunks", "robots"],
-    )
+        for name, snippet in {"rates": _RATES, "middle": _MIDDLE}.items():
+            jobs[name] = ("sites", _SITE + _SEEN + snippet)
+    if features.traits.colliding:
+        jobs |= {name: (over, _COLLIDE + job) for name, (over, job) in COLLISION_JOBS.items()}
+    jobs |= {
+        "look": ("sites", _SITE + _SEEN + _LOOK),
+        "add": ("chunks", _ADD),
+        "report": ("robots", _REPORT),
+    }
+    kernels = [kernel(name, snippet) for name, (_, snippet) in jobs.items()]
+    return Look(kernels, [over for over, _ in jobs.values()])

@@ -87,6 +87,7 @@ auto choose_sum = choose;
 
 // Energies that a mass exchanged, kept by mass.
 struct Accounts { real values[ACCOUNTS]; };
+// collisions
 auto open_accounts = [=](scalar* kept, Slot at) __attribute__((always_inline)) -> Accounts {
     Accounts accounts = {};
     for (int e = 0; LEDGER && e < ACCOUNTS; ++e)
@@ -287,13 +288,14 @@ auto move_slot = [&](Slot at, const scalar* now, scalar* then, Vec& low, Sum& v,
     real w;
     const Vec here = own_quad(now, at, w);
     const scalar* const rates = EULER ? state.rates.data : state.middle_rates.data;
-    const Force sum = gather(at, now, here, sine, cosine, DASHPOTS ? rates : nullptr);
+    Force sum = gather(at, now, here, sine, cosine, DASHPOTS ? rates : nullptr);
     const Vec high = shifted ? own_quad(then, at, w) : here;
     Sum a = sum_of(&high, &low, 0);
     const Sum x_before = a, v_before = v;
     Accounts accounts = open_accounts(state.ledgers.data, at);
     if (LEDGER && (ACTUATED || TIMETABLE) && !shifted) accounts.values[0] += sum.power * time;
     if (LEDGER && DASHPOTS) accounts.values[5] += sum.dash_power * time;
+    touches_of(at, sum, accounts, time, true);
     const Own own = own_of(at, here, rest);
     if (EULER) move_mass_euler(a, v, sum.f, w, accounts.values, own);
     else {
@@ -313,7 +315,9 @@ auto shift_slot = [&](Slot at, const scalar* now, scalar* then, Vec low, scalar 
         __attribute__((always_inline)) {
     real w;
     const Vec here = own_quad(now, at, w);
-    const Force sum = gather(at, now, here, sine, cosine, nullptr);
+    Force sum = gather(at, now, here, sine, cosine, nullptr);
+    Accounts none = {};
+    touches_of(at, sum, none, scalar(0), false);
     if (LEDGER && (ACTUATED || TIMETABLE)) {
         Accounts accounts = open_accounts(state.ledgers.data, at);
         accounts.values[0] += sum.power * GRADIENT_KICK;

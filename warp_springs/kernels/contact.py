@@ -1,0 +1,118 @@
+"""The temporary spring between two features that are close: C++ text that every layout shares.
+
+Everything here is scalar: a pair at a time, in whatever lanes the rest of a layout computes.
+"""
+
+__all__ = ["CONTACT"]
+
+CONTACT = r"""
+struct Point { scalar x, y, z; };
+auto minus = [](Point a, Point b) -> Point { return Point{a.x - b.x, a.y - b.y, a.z - b.z}; };
+auto grown = [](Point a, scalar s) -> Point { return Point{a.x * s, a.y * s, a.z * s}; };
+auto inner = [](Point a, Point b) -> scalar { return a.x * b.x + a.y * b.y + a.z * b.z; };
+auto within_unit = [](scalar a) -> scalar {
+    return a > scalar(0) ? (a < scalar(1) ? a : scalar(1)) : scalar(0);
+};
+auto root_of = [=](scalar a) -> scalar { return lane_of(square_root(zero + a), 0); };
+
+// The weights of the point of a triangle, or of a segment, that is nearest to p.
+auto nearest_on_segment = [=](Point p, Point a, Point b, scalar* weights) {
+    const Point ab = minus(b, a);
+    const scalar length2 = inner(ab, ab);
+    const scalar along = inner(minus(p, a), ab);
+    const scalar t = length2 > scalar(0) ? within_unit(along / length2) : scalar(0);
+    weights[0] = scalar(1) - t; weights[1] = t;
+};
+auto nearest_on_triangle = [=](Point p, const Point* corner, scalar* weights) {
+    const Point ab = minus(corner[1], corner[0]), ac = minus(corner[2], corner[0]);
+    const Point ap = minus(p, corner[0]);
+    const scalar g00 = inner(ab, ab), g01 = inner(ab, ac), g11 = inner(ac, ac);
+    const scalar r0 = inner(ab, ap), r1 = inner(ac, ap), det = g00 * g11 - g01 * g01;
+    if (det > scalar(0)) {
+        const scalar u = (g11 * r0 - g01 * r1) / det, v = (g00 * r1 - g01 * r0) / det;
+        if (u >= scalar(0) && v >= scalar(0) && u + v <= scalar(1)) {
+            weights[0] = scalar(1) - u - v; weights[1] = u; weights[2] = v;
+            return;
+        }
+    }
+    scalar best = 0;
+    for (int side = 0; side < 3; ++side) {
+        const int i = side, j = (side + 1) % 3;
+        scalar w[2];
+        nearest_on_segment(p, corner[i], corner[j], w);
+        const Point q = {corner[i].x * w[0] + corner[j].x * w[1],
+                         corner[i].y * w[0] + corner[j].y * w[1],
+                         corner[i].z * w[0] + corner[j].z * w[1]};
+        const Point d = minus(p, q);
+        const scalar far = inner(d, d);
+        if (side == 0 || far < best) {
+            best = far;
+            weights[0] = weights[1] = weights[2] = scalar(0);
+            weights[i] = w[0]; weights[j] = w[1];
+        }
+    }
+};
+auto nearest_of_segments = [=](const Point* a, const Point* b, scalar* wa, scalar* wb) {
+    const Point u = minus(a[1], a[0]), v = minus(b[1], b[0]), r = minus(a[0], b[0]);
+    const scalar uu = inner(u, u), vv = inner(v, v), uv = inner(u, v);
+    const scalar ur = inner(u, r), vr = inner(v, r), det = uu * vv - uv * uv;
+    scalar s = det > uu * vv * scalar(1e-12) ? within_unit((uv * vr - vv * ur) / det)
+                                            : scalar(0.5);
+    scalar t = vv > scalar(0) ? within_unit((uv * s + vr) / vv) : scalar(0);
+    s = uu > scalar(0) ? within_unit((uv * t - ur) / uu) : scalar(0);
+    wa[0] = scalar(1) - s; wa[1] = s;
+    wb[0] = scalar(1) - t; wb[1] = t;
+};
+
+// What the temporary spring of a pair does: the force on the first feature, which the weights
+// share among the masses of both (negative: those of the second), its energy, and the power of its
+// friction and of its damping.
+struct Push { scalar weights[4]; Point force; scalar energy, rub, soft; };
+// The first feature has m masses and the second n, m + n = 4 of them `at` their places, with the
+// numbers of `contact` (see warp_springs.engine.colliding), in a kick of `time`; `rubs`: with
+// losses, which ask for the velocity and the inverse mass of each. False: they do not touch.
+auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time, bool rubs,
+                    auto speed_of, auto inverse_of, Push& pair) -> bool {
+    scalar* const weights = pair.weights;
+    weights[0] = scalar(1);
+    if (m == 1) nearest_on_triangle(at[0], at + 1, weights + 1);
+    else nearest_of_segments(at, at + 2, weights, weights + 2);
+    Point d = {};  // from the second feature to the first
+    for (int c = 0; c < 4; ++c) {
+        if (c >= m) weights[c] = -weights[c];
+        d.x += at[c].x * weights[c]; d.y += at[c].y * weights[c]; d.z += at[c].z * weights[c];
+    }
+    const scalar far2 = inner(d, d), thickness = contact[0];
+    if (!(far2 < thickness * thickness) || !(far2 > TINY)) return false;
+    const scalar far = root_of(far2);
+    const Point normal = grown(d, scalar(1) / far);
+    const scalar depth = thickness - far, k = contact[1], push = k * depth;
+    pair.energy = k * depth * depth * scalar(0.5);
+    pair.force = grown(normal, push);
+    pair.rub = pair.soft = scalar(0);
+    if (!rubs) return true;
+    Point u = {};
+    scalar inverse = 0;
+    for (int c = 0; c < 4; ++c) {
+        const Point speed = speed_of(c);
+        u.x += speed.x * weights[c]; u.y += speed.y * weights[c]; u.z += speed.z * weights[c];
+        inverse += inverse_of(c) * weights[c] * weights[c];
+    }
+    const scalar rate = inner(u, normal);
+    const scalar damping = scalar(2) * contact[4] * root_of(k / inverse);
+    scalar softer = -damping * rate;
+    if (push + softer < scalar(0)) softer = -push;  // it never pulls
+    pair.soft = -softer * (rate + softer * inverse * time * scalar(0.5));
+    const Point slip = minus(u, grown(normal, rate));
+    const scalar speed = root_of(inner(slip, slip));
+    // A quarter of what would stop the slip at once: a mass has several such springs.
+    const scalar stop = speed / (inverse * time) * scalar(0.25), load = push + softer;
+    const scalar rub = stop <= contact[2] * load ? stop
+        : contact[3] * load < stop ? contact[3] * load : stop;
+    pair.rub = rub * (speed - rub * inverse * time * scalar(0.5));  // at the mean speed
+    const scalar along = speed > scalar(0) ? rub / speed : scalar(0);
+    pair.force = Point{normal.x * load - slip.x * along, normal.y * load - slip.y * along,
+                        normal.z * load - slip.z * along};
+    return true;
+};
+"""
