@@ -11,6 +11,7 @@ import numpy as np
 from evolve.errors import RunError
 from evolve.judging.evaluate import Evaluator
 from evolve.judging.worlds import looked_at_again
+from evolve.reports.bodies import shown, various
 from evolve.reports.show import FILM_CYCLES, Show, Style, Watch, label
 from evolve.run import Run
 from evolve.store import Finalist, Store
@@ -48,7 +49,8 @@ def export(
 
     Args:
         run: A run in which somebody has a fitness.
-        best: How many different individuals are shown in the zoo.
+        best: How many are shown in the zoo: the best different individuals; where bodies evolve,
+            the champion and good ones unlike each other in their descriptors.
         film: "mp4" or "webp": write champion and zoo as films too.
         style: How animations are written.
         watch: Told what is being done, if anybody wants to know.
@@ -64,7 +66,8 @@ def export(
     """
     with run.exporting(), Store.open(run.record_path, write=True) as store:
         finalists = crown(run, store, best)
-        return finalists, _zoo(Show(run, store, style, watch), finalists[:best], film)
+        zoo = shown(run, store, finalists, best)
+        return finalists, _zoo(Show(run, store, style, watch), zoo, film)
 
 
 def export_generation(
@@ -132,6 +135,8 @@ def trial(run: Run, store: Store, ids: Sequence[int], energy: bool = False) -> w
 def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     """Look twice at the best different individuals, and record what is left of their fitness.
 
+    Where bodies evolve, also at good ones whose bodies are unlike the others.
+
     Returns:
         All of them, survivors first, the fittest first.
 
@@ -141,6 +146,8 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     ids = store.best(max(best, run.config.task.second_look.candidates))
     if not ids:
         raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to export")
+    if not run.config.fixed_body:
+        ids = list(dict.fromkeys([*ids, *various(run, store, best)]))
     encoding = run.config.make_encoding()
     genomes = encoding.from_bytes(store.genomes(ids))
     fitness = store.scores(ids).fitness

@@ -12,6 +12,7 @@ import numpy as np
 
 from evolve.errors import RunError
 from evolve.fitness import UNITS
+from evolve.reports.bodies import shown
 from evolve.reports.comparison import Group, compare, groups
 from evolve.reports.diversity import diversity, diversity_plot
 from evolve.reports.export import FILM_CYCLES, ZOO_SIZE, trial
@@ -141,7 +142,8 @@ def write_report(
 def _subject(run: Run) -> Subject:
     with run.read() as store:
         finalists = store.finalists()
-        zoo = [f.id for f in finalists[:ZOO_SIZE]] or store.best(ZOO_SIZE)
+        shows = shown(run, store, finalists, ZOO_SIZE)
+        zoo = [one.id for one in shows] or store.best(ZOO_SIZE)
         if not zoo:
             raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to report")
         record = store.record()
@@ -274,14 +276,15 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
 
     report.section("Zoo")
     labels = [f"#{i}   {subject.fitness(i):.2f}" for i in subject.zoo]
-    words = f"The {len(labels)} best different individuals at the end of their trial."
+    kind = "best different" if subject.run.config.fixed_body else "good and most unlike"
+    words = f"The {len(labels)} {kind} individuals at the end of their trial."
     report.row(report.still(subject.film, words, labels=labels))
     if subject.finalists:
         report.table(
             [
                 (f"#{f.id}", f.generation, f.fitness, _share(f.halved_kept),
                  _share(f.perturbed_kept), "yes" if f.survives else "no")
-                for f in subject.finalists[:ZOO_SIZE]
+                for f in subject.finalists if f.id in subject.zoo
             ],
             ("individual", "generation", subject.run.config.task.fitness, "left at half the step",
              "left from perturbed starts", "survives"),

@@ -1,0 +1,69 @@
+"""Which robots show what a run that evolves bodies has found: good ones, each unlike the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from evolve.config import DESCRIPTORS
+from evolve.run import Run
+from evolve.store import Finalist, Store
+
+__all__ = ["shown", "spread_out", "various"]
+
+CANDIDATES = 512
+"""How many of the best different individuals are considered."""
+SHARE = 0.4
+"""Share of the best fitness that an individual must have to be considered."""
+
+
+def various(run: Run, store: Store, count: int) -> list[int]:
+    """Ids of good individuals that differ in what is measured of their bodies, the best first.
+
+    Each next one is, of the good, the one least like those before: farthest from the nearest of
+    them in the descriptors that the run records beside way and height (in these, where it records
+    no other), each in units of its standard deviation.
+
+    Args:
+        run: A run in which somebody has a fitness.
+        store: Its record.
+        count: How many; fewer where fewer are good.
+    """
+    ids = store.best(CANDIDATES)
+    scores = store.scores(ids)
+    names = [name for name in run.config.descriptors if name not in DESCRIPTORS]
+    values = np.stack([scores.descriptors[name] for name in names or DESCRIPTORS], axis=1)
+    least = scores.fitness[0] * (SHARE if scores.fitness[0] > 0.0 else 1.0 / SHARE)
+    good = (scores.fitness >= least) & np.isfinite(values).all(axis=1)
+    good[0] = True
+    chosen = spread_out(np.nan_to_num(values[good]), count)
+    return [ids[place] for place in np.flatnonzero(good)[chosen]]
+
+
+def spread_out(values: np.ndarray, count: int) -> np.ndarray:
+    """Rows of a table (n, D) that lie far apart, the first row first, shape (<= count,)."""
+    scale = values.std(axis=0)
+    scaled = values / np.where(scale > 0.0, scale, 1.0)
+    chosen = [0]
+    nearest = np.linalg.norm(scaled - scaled[0], axis=1)
+    nearest[0] = -1.0
+    while len(chosen) < min(count, len(values)):
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
+        nearest[chosen] = -1.0
+    return np.array(chosen)
+
+
+def shown(run: Run, store: Store, finalists: Sequence[Finalist], count: int) -> Sequence[Finalist]:
+    """Who of those that were looked at twice is shown in the zoo.
+
+    The best, if all share one body; else the champion and `various` others, filled up with the
+    best where there are too few of them.
+    """
+    if run.config.fixed_body:
+        return finalists[:count]
+    wanted = set(various(run, store, count))
+    different = [one for one in finalists[1:] if one.id in wanted]
+    others = [one for one in finalists[1:] if one.id not in wanted]
+    return [*finalists[:1], *different, *others][:count]
