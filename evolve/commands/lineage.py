@@ -12,7 +12,6 @@ from evolve.commands.shared import Flag, Folder
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from evolve.store import Ancestor
 
 __all__ = ["Lineage"]
 
@@ -40,6 +39,7 @@ class Lineage:
 
         from evolve.errors import RunError
         from evolve.fitness import UNITS
+        from evolve.reports.family import line, steps
         from evolve.run import Run
 
         run = Run.open(self.directory)
@@ -48,10 +48,10 @@ class Lineage:
             if self.of is None and not crowned:
                 raise RunError(f"{self.directory}: nobody has a fitness yet")
             everybody = store.ancestors(crowned[0] if self.of is None else self.of)
-        line = _line(everybody)
-        shown = line if self.whole else _steps(line)
+        way = line(everybody)
+        shown = way if self.whole else steps(way)
         console.print(
-            f"#{line[-1].id}: {len(everybody) - 1:,} ancestors, {len(line) - 1} steps from the "
+            f"#{way[-1].id}: {len(everybody) - 1:,} ancestors, {len(way) - 1} steps from the "
             f"first, {len(shown)} individuals shown; fitness in {UNITS[run.config.task.fitness]}",
             highlight=False,
             soft_wrap=True,
@@ -64,22 +64,3 @@ class Lineage:
             table.add_row(f"#{one.id}", str(one.generation), f"{one.fitness:.4g}", parents)
         console.print(table, highlight=False)
         return 0
-
-
-def _line(everybody: list[Ancestor]) -> list[Ancestor]:
-    """From the first ancestor to the individual, always by the fitter parent."""
-    known = {one.id: one for one in everybody}
-    line = [everybody[0]]
-    while line[-1].parents:
-        parents = [known[parent] for parent in line[-1].parents]
-        line.append(max(parents, key=lambda one: (one.fitness == one.fitness, one.fitness)))
-    return line[::-1]
-
-
-def _steps(line: list[Ancestor]) -> list[Ancestor]:
-    """The first, whoever was fitter than all before, and the last."""
-    shown = line[:1]
-    for one in line[1:]:
-        if not one.fitness <= shown[-1].fitness or one is line[-1]:
-            shown.append(one)
-    return shown

@@ -16,6 +16,7 @@ from evolve.reports.bodies import shown
 from evolve.reports.comparison import Group, compare, groups
 from evolve.reports.diversity import diversity, diversity_plot
 from evolve.reports.export import FILM_CYCLES, ZOO_SIZE, trial
+from evolve.reports.family import family
 from evolve.reports.figures import clock, demotions, describe, metric, results, verdict
 from evolve.reports.findings import findings
 from evolve.reports.parameters import parameters
@@ -128,6 +129,8 @@ def write_report(
         _learning(report, subject, several, store.costs())
         _champion(report, subject)
         _zoo(report, subject)
+        if not run.config.fixed_body:
+            family(report, run, store, subject.zoo[0])
         if len(several) > 1:
             _comparison(report, subject, several)
         _findings(report, subject, several, notes)
