@@ -48,6 +48,7 @@ from warp_springs.kernels.lanes import Features
 from warp_springs.kernels.traits import PLAIN, Traits
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
+from warp_springs.stability import Status
 
 __all__ = ["Batch", "Group", "Slots"]
 
@@ -73,6 +74,9 @@ PACKED = (
     *PACKED_COLLISIONS,
 )
 
+
+#: Springs whose coefficients are worked out at a time.
+PIECE = 8192
 
 #: What robots that one kernel steps have in common: the width of their bundles, whether they
 #: actuate, their layout, their traits.
@@ -180,6 +184,7 @@ class Batch:
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
+        self._refused = np.zeros(len(robots), bool)  # their step is certainly unstable
 
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -262,13 +267,25 @@ class Batch:
                 )
 
     def _alike(self, cohort: Strip) -> Iterator[tuple[bool, np.ndarray]]:
-        """Members of a cohort that may share bundles: alike in actuation, step and sub-steps."""
+        """Members of a cohort that may share bundles: alike in actuation, step and sub-steps.
+
+        And alike in whether they are stepped at all: a bundle of the refused costs no time.
+        """
         actuated = breathes(cohort)
         levels = self._method.levels(cohort, self._scene)
         substeps = self._method.substeps(cohort, self._scene, levels)
-        kinds, kind = np.unique(np.stack([actuated, levels, substeps]), axis=1, return_inverse=True)
+        traits = np.stack([actuated, levels, substeps, self._refuse(cohort, levels)])
+        if (traits == traits[:, :1]).all():  # as robots of one body mostly are
+            yield bool(actuated[0]), np.arange(len(actuated))
+            return
+        kinds, kind = np.unique(traits, axis=1, return_inverse=True)
         for index in range(kinds.shape[1]):
             yield bool(kinds[0, index]), np.flatnonzero(kind.ravel() == index)
+
+    def _refuse(self, strip: Strip, levels: np.ndarray) -> np.ndarray:
+        """Look up which robots of a strip cannot be stepped so, shape (n,) bool."""
+        self._refused[strip.ids] = self._method.refused(strip, self._scene, levels)
+        return self._refused[strip.ids]
 
     def _features(self, width: int, actuated: bool, traits: Traits) -> Features:
         scene, ground = self._scene, self._scene.ground
@@ -293,6 +310,8 @@ class Batch:
         """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
         n, method = len(strip.ids), self._method
         levels = method.levels(strip, self._scene)
+        if not strip.shared or self._scene.collisions is not None:  # nobody asked before
+            self._refuse(strip, levels)
         self.levels[strip.ids] = levels
         self.substeps[strip.ids] = method.substeps(strip, self._scene, levels)
         within = np.arange(n)
@@ -300,12 +319,13 @@ class Batch:
             [len(self) + within // width, within % width, np.full(n, width)], axis=1
         )
         order, row, partner = sort_rows(strip)
-        table = coefficients(strip.fields, order, actuated)
         elements = {}
         if strip.elements is not NONE:
             elements = element_buffers(strip.fields, order, method.spans(levels))
-            table = np.concatenate([table, spring_columns(strip.fields, order)], axis=1)
-        self._tables.append(self._describe(strip, width, table.shape[1], elements))
+        columns, springs, invalid = self._spring_tables(strip, width, order, actuated)
+        self._tables.append(self._describe(strip, width, columns, elements))
+        for table in springs:
+            self._append("coefficients", table)
         self._append("rows", row)
         self._append("partners", partner)
         if width > 1:
@@ -315,7 +335,6 @@ class Batch:
         oscillators = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
         per_robot = {  # values, and how many rows of them each robot has
             "inverse_masses": (1.0 / fields["masses"], strip.masses),
-            "coefficients": (table, strip.counts),
             "omegas": (fields["omega"], one),
             "positions": (fields["positions"], strip.masses),
             "velocities": (fields["velocities"], strip.masses),
@@ -332,11 +351,10 @@ class Batch:
                 "quanta": (quanta, one),
             }
         # A mass too large for the precision would come out as one without an inverse.
-        invalid = largest(fields["masses"], strip.masses) > np.finfo(real).max
+        invalid |= largest(fields["masses"], strip.masses) > np.finfo(real).max
         for name, (values, rows) in per_robot.items():
             cast = values.astype(dtype_of(name, method.precision), copy=False)
-            if name != "coefficients" or strip.elements is NONE:  # limits may be infinite
-                invalid |= not_finite(cast, rows)
+            invalid |= not_finite(cast, rows)
             self._append(name, lane_major(cast, n, width))
         self._pack_elements(strip, width, elements, order, row)
         if self._scene.collisions is not None:
@@ -354,11 +372,41 @@ class Batch:
         reach = np.where(longest > 0.0, method.limits.stretch * longest, np.inf)
         for name, values in {
             "reaches2": reach**2,
-            "states": method.birth(strip, self._scene, levels, invalid),
+            "states": self._birth(strip, invalid),
         }.items():
             self._append(
                 name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)
             )
+
+    def _birth(self, strip: Strip, invalid: np.ndarray) -> np.ndarray:
+        """Status of each robot before its first step, shape (n,)."""
+        refused = self._refused[strip.ids]
+        return np.select([invalid, refused], [Status.INVALID, Status.UNSTABLE_STEP], Status.OK)
+
+    def _spring_tables(
+        self, strip: Strip, width: int, order: np.ndarray | slice, actuated: bool
+    ) -> tuple[int, list[np.ndarray], np.ndarray]:
+        """The coefficients of the springs, a few bundles at a time, which fit the cache.
+
+        Returns:
+            How many a spring has; the pieces, lane by lane; and which robots they are not finite
+            for, shape (n,).
+        """
+        n, start = len(strip.ids), np.append(0, np.cumsum(strip.counts))
+        bundles = max(1, PIECE // max(int(strip.counts.max()) * width, 1))
+        pieces, invalid = [], np.zeros(n, bool)
+        for first in range(0, n, bundles * width):
+            last = min(first + bundles * width, n)
+            part = slice(start[first], start[last])
+            part = part if isinstance(order, slice) else order[part]
+            table = coefficients(strip.fields, part, actuated)
+            if strip.elements is not NONE:
+                table = np.concatenate([table, spring_columns(strip.fields, part)], axis=1)
+            cast = table.astype(real_dtype(self._method.precision), copy=False)
+            if strip.elements is NONE:  # limits may be infinite
+                invalid[first:last] = not_finite(cast, strip.counts[first:last])
+            pieces.append(lane_major(cast, last - first, width))
+        return table.shape[1], pieces, invalid
 
     def _pack_elements(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -105,11 +106,18 @@ class FixedBody:
         """
         settings, lengths = self.settings, self.body.lengths
         (low, high), (soft, hard) = settings.rest_length, settings.stiffness
+        rests = (high - low) * self.spread(rest)
+        rests += low
+        rests *= lengths
+        reaches = settings.amplitude * self.spread(amplitude)
+        reaches *= lengths
+        stiffnesses = (hard / soft) ** self.spread(stiffness)
+        stiffnesses *= soft
         return self.variants(
-            rest_length=lengths * (low + (high - low) * self.spread(rest)),
-            amplitude=lengths * (settings.amplitude * self.spread(amplitude)),
+            rest_length=rests,
+            amplitude=reaches,
             phase=2.0 * np.pi * self.spread_phase(phase),
-            stiffness=soft * (hard / soft) ** self.spread(stiffness),
+            stiffness=stiffnesses,
             omega=np.full(len(rest), 2.0 * np.pi / settings.period),
             **more,
         )
@@ -138,24 +146,30 @@ class FixedBody:
         centres = self.middles[rng.integers(len(self.own), size=n)]
         reach = float(np.linalg.norm(np.ptp(self.middles, axis=0)))
         radii = rng.random(n) * (0.5 * reach)
-        squared = np.zeros((n, len(self.own)))
-        for i in range(3):
-            gap = self.middles[:, i] - centres[:, i, None]
-            gap *= gap
-            squared += gap
-        return squared <= radii[:, None] ** 2
+        inside = np.empty((n, len(self.own)), bool)
+        for rows in self._pieces(n):
+            squared = sum((self.middles[:, i] - centres[rows, i, None]) ** 2 for i in range(3))
+            np.less_equal(squared, radii[rows, None] ** 2, out=inside[rows])
+        return inside
 
     def half_spaces(self, n: int, rng: np.random.Generator) -> np.ndarray:
         """For each of n pairs, the springs on one side of a plane through the body: (n, R)."""
         normals = rng.standard_normal((n, 3))
         through = self.middles[rng.integers(len(self.own), size=n)]
         # Written out: a matrix product might add up differently on another number of threads.
-        offsets = np.zeros((n, len(self.own)))
-        for i in range(3):
-            gap = self.middles[:, i] - through[:, i, None]
-            gap *= normals[:, i, None]
-            offsets += gap
-        return offsets > 0.0
+        beyond = np.empty((n, len(self.own)), bool)
+        for rows in self._pieces(n):
+            offsets = sum(
+                normals[rows, i, None] * (self.middles[:, i] - through[rows, i, None])
+                for i in range(3)
+            )
+            np.greater(offsets, 0.0, out=beyond[rows])
+        return beyond
+
+    def _pieces(self, n: int) -> Iterator[slice]:
+        """n genomes, a few at a time: their springs fit the cache."""
+        step = max(1, 16384 // len(self.own))
+        return (slice(first, first + step) for first in range(0, n, step))
 
 
 def muscles(body: ws.Robot, which: str) -> np.ndarray:

@@ -239,3 +239,15 @@ def test_spring_evaluations_leave_out_stopped_robots():
     steps = round(DURATION / DT)
     both = ws.Simulation([bad, good], ws.Scene(), dt=DT, integrator="leapfrog").run(DURATION)
     assert both.spring_evaluations == good.n_springs * steps
+
+
+def test_robots_that_are_refused_share_no_lanes_with_those_that_step():
+    cube = ws.shapes.cube().moved((0.0, 0.0, 0.01))
+    stiffness = np.tile(cube.stiffness, (64, 1))
+    stiffness[::2] *= 1e9
+    sim = ws.Simulation(cube.variants(stiffness=stiffness), dt=1e-3)
+    result = sim.run(1e-3)
+    refused = result.status == ws.Status.UNSTABLE_STEP
+    np.testing.assert_array_equal(refused, np.arange(64) % 2 == 0)
+    bundle = sim._batch.slots.bundle
+    assert not set(bundle[refused]) & set(bundle[~refused])

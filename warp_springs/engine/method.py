@@ -9,7 +9,7 @@ import numpy as np
 from warp_springs.engine.packing import Strip, breathes, fastest_actuation, largest
 from warp_springs.kernels.law import DRIFTS, constants
 from warp_springs.scene import Scene
-from warp_springs.stability import Limits, Status, certainly_unstable, stable_step
+from warp_springs.stability import Limits, certainly_unstable, stable_step
 
 __all__ = ["AUTO_DT", "LEVELS", "Method"]
 
@@ -62,7 +62,7 @@ class Method:
         wanted = np.maximum(wanted, np.where(breathes(strip), turn, 0.0))
         levels = np.ceil(np.log2(np.clip(wanted, 1.0, 2.0**LEVELS))).astype(np.int64)
         # A robot that is refused even so is not stepped at all.
-        return np.where(self._refused(strip, scene, levels), 0, levels)
+        return np.where(self.refused(strip, scene, levels), 0, levels)
 
     def substeps(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
         """Contact sub-steps in a drift of each robot, shape (n,).
@@ -82,7 +82,7 @@ class Method:
         lightest = largest(1.0 / strip.fields["masses"], strip.masses)
         return np.sqrt(scene.stiffest_surface * lightest) * self.spans(levels)
 
-    def _refused(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
+    def refused(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
         """Robots that these steps cannot simulate, shape (n,) bool."""
         refused = certainly_unstable(strip, self.dt / 2.0**levels, self.integrator)
         if not scene.stiffest_surface:
@@ -94,13 +94,6 @@ class Method:
     def spans(self, levels: np.ndarray) -> np.ndarray:
         """Duration of a drift of each robot [s], shape (n,)."""
         return self.dt / 2.0**levels / DRIFTS[self.integrator]
-
-    def birth(
-        self, strip: Strip, scene: Scene, levels: np.ndarray, invalid: np.ndarray
-    ) -> np.ndarray:
-        """Status of each robot before its first step, shape (n,)."""
-        unstable = self._refused(strip, scene, levels)
-        return np.select([invalid, unstable], [Status.INVALID, Status.UNSTABLE_STEP], Status.OK)
 
     def constants(self, scene: Scene) -> np.ndarray:
         """The constants of the kernels, a row for each level."""
