@@ -1,11 +1,15 @@
-"""Collisions: do piles come to rest as they should?
+"""Collisions: what does a step with them cost, and do piles come to rest as they should?
 
+Without arguments: two balls crash, and a pile of cubes lies, with and without collisions. Before a
+time is printed the balls must have bounced off each other with their momentum and energy.
+``--rest 600`` leaves a pile alone for ten minutes: nothing may drift, creep, or warm up.
 ``--piles 10`` drops ten cubes from ten seeds, in every layout and with every integrator.
 """
 
 import argparse
 import itertools
 import time
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -76,7 +80,82 @@ def pile(seed: int, layout: str, integrator: str, precision: str = "float64") ->
     }
 
 
-def table(rows: list[dict]) -> None:
+def balls(subdivisions: int) -> list[ws.Robot]:
+    """Two balls on their way into each other."""
+    ball = ws.shapes.sphere(0.1, subdivisions, mass=2.0, stiffness=2e3)
+    ball = ball.moved(-ball.center_of_mass)
+    return [ball, ball.moved((0.02, 0.01, 0.21)).moving((0, 0, -1.0))]
+
+
+def crash(subdivisions: int, precision: str = "float64") -> dict:
+    """Time two balls that crash, with and without collisions."""
+    robots, seconds = balls(subdivisions), {}
+    smooth = {"static_friction": 0.0, "kinetic_friction": 0.0, "damping": 0.0}
+    for collisions in (ws.Collisions(stiffness=1e4, **smooth), None):
+        scene = ws.Scene(gravity=(0, 0, 0), ground=None, collisions=collisions)
+        step = 0.5 * ws.stable_dt(robots[0], ws.Scene(ground=None, collisions=ws.Collisions()))
+        simulation = ws.Simulation(
+            robots, scene, step, world="together", layout="flat", precision=precision
+        )
+        result = simulation.run(10 * step)  # compiles
+        result = simulation.run(300 * step, energy=True)
+        if collisions is not None:
+            _validate(result, simulation.members[0][0][1], robots[0].mass)
+        seconds[collisions is not None] = result.wall_time / result.steps
+    world = result.robots[0]
+    features = world.n_masses + len(world.faces) + len(world.faces) * 3 // 2
+    extra = seconds[True] - seconds[False]
+    return {
+        "faces": len(world.faces),
+        "springs": world.n_springs,
+        "features": features,
+        "without [µs/step]": 1e6 * seconds[False],
+        "with [µs/step]": 1e6 * seconds[True],
+        "ratio": seconds[True] / seconds[False],
+        "extra [ns/feature/kick]": 1e9 * extra / features / 3,
+    }
+
+
+def _validate(result: ws.Result, first: slice, mass: float) -> None:
+    world, v = result.robots[0], result.velocities(0)
+    momentum = world.masses @ v
+    if np.abs(momentum - (0, 0, -mass)).max() > 1e-6:
+        raise SystemExit(f"the momentum is {momentum}, not that of the start")
+    if not v[first, 2].mean() < -0.05:
+        raise SystemExit("the balls did not meet")
+    if np.abs(result.energy.residual).max() > 1e-2 * result.energy.total[0, 0]:
+        raise SystemExit("energy was made or lost")
+
+
+def resting(seconds: float, seed: int = 1) -> dict:
+    """Lay a pile down with damping, end the damping, and wait."""
+    still = ws.Simulation(dropped(seed), box(damping=5.0), world="together")
+    start = still.run(20.0)
+    members = [place for _, place in still.members[0]]
+    at = start.positions(0)
+    cubes = [
+        cube.replace(positions=at[place], velocities=None)
+        for cube, place in zip(dropped(seed), members, strict=True)
+    ]
+    simulation = ws.Simulation(cubes, box(damping=0.0), world="together", threads=1)
+    result = simulation.run(seconds, fps=200 / seconds, energy=True)
+    frames, kinetic = result.frames(0), result.energy.kinetic[0]
+    lift = 9.81 * 0.8 * EDGE
+    return {
+        "seconds": seconds,
+        "status": ws.Status(result.status[0]).name,
+        "drift of the last tenth [m]": float(
+            np.abs(frames[-20:].mean(0) - frames[1:21].mean(0)).max()
+        ),
+        "wobble [m]": float(np.abs(frames - frames[0]).max()),
+        "early [lift of an edge]": float(kinetic[1:21].max() / lift),
+        "late": float(kinetic[-20:].max() / lift),
+        "depth / edge": deepest(result.robots[0], simulation.members[0], frames) / EDGE,
+        "s": result.wall_time,
+    }
+
+
+def table(rows: Iterable[dict]) -> None:
     """Print rows as Markdown, as they come."""
     for number, row in enumerate(rows):
         if number == 0:
@@ -89,9 +168,17 @@ def main() -> None:
     """Run what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--piles", type=int, default=0, help="seeds of ten cubes each")
-    parser.add_argument("--layouts", nargs="+", default=["lanes"])
+    parser.add_argument("--layouts", nargs="+", default=["lanes", "flat"])
     parser.add_argument("--integrators", nargs="+", default=["chin4", "leapfrog", "euler"])
+    parser.add_argument("--rest", type=float, help="seconds that a pile is left alone")
+    parser.add_argument("--balls", type=int, nargs="+", default=[2, 3, 4], help="subdivisions")
     given = parser.parse_args()
+    if given.rest:
+        table([resting(given.rest)])
+        return
+    if not given.piles:
+        table(map(crash, given.balls))
+        return
     cases = itertools.product(range(given.piles), given.layouts, given.integrators)
     table(pile(*case) for case in cases)
 

@@ -175,3 +175,35 @@ def test_looking_changes_nothing(cube):
     seen = ws.Simulation(robots, scene, dt=5e-4, world="together").run(0.3, fps=100)
     unseen = ws.Simulation(robots, scene, dt=5e-4, world="together").run(0.3)
     assert np.array_equal(seen.positions(0), unseen.positions(0))
+
+
+def garbage(rng):
+    """A body that nobody would build: masses anywhere, faces and springs at random."""
+    n = int(rng.integers(3, 9))
+    springs = np.array([(i, j) for i in range(n) for j in range(i)])
+    chosen = rng.random(len(springs)) < 0.6
+    return ws.Robot(
+        masses=10.0 ** rng.uniform(-4, 2, n),
+        positions=np.round(rng.normal(0, 0.1, (n, 3)), int(rng.integers(1, 6))),
+        velocities=rng.normal(0, 10.0 ** rng.uniform(-1, 3), (n, 3)),
+        springs=springs[chosen],
+        stiffness=10.0 ** rng.uniform(0, 7, chosen.sum()),
+        faces=[rng.choice(n, 3, replace=False) for _ in range(rng.integers(0, 8))],
+    )
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat"])
+def test_garbage_ruins_its_own_world_alone(cube, layout):
+    pair = [cube, cube.rotated((1, 2, 3), 0.5).moved((0.02, 0, 0.13))]
+    scene = ws.Scene(collisions=ws.Collisions())
+    options = {"dt": 5e-4, "layout": layout}
+    alone = ws.Simulation(pair, scene, world="together", **options).run(0.05)
+    rng, worlds = np.random.default_rng(3), 12
+    robots = [garbage(rng) for _ in range(2 * worlds)]
+    numbers = [i // 2 for i in range(2 * worlds)]
+    everybody = [*robots, *pair]
+    result = ws.Simulation(everybody, scene, world=[*numbers, 99, 99], **options).run(0.05)
+    assert (result.status[:-1] != ws.Status.OK).any() and result.status[-1] == ws.Status.OK
+    assert np.array_equal(result.positions(worlds), alone.positions(0))
+    for world in range(worlds):
+        assert np.isfinite(result.positions(world)).all()
