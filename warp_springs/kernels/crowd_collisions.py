@@ -38,7 +38,7 @@ MARGIN = 4
 #: What stands there without collisions.
 NO_CROWD_COLLIDING = r"""
 auto touches_of = [](Slot, Force&, Accounts&, scalar, bool) {};
-auto touch_energy = [](Slot) -> real { return zero; };
+auto touch_energy = [=](Slot) -> real { return zero; };
 """
 
 CROWD_COLLIDING = (
