@@ -94,6 +94,15 @@ def test_stiffness_in_time_interpolates_and_repeats(cube):
     assert ratio[:, 1] / plain[1] == pytest.approx(np.ones(4))
 
 
+def test_elements_of_no_spring_change_nothing(cube):
+    none = np.zeros(0, np.int64)
+    robot = cube.with_winch([0, 1], [0, 1], none).with_stiffness_in_time([0, 1], [1, 2], none)
+    robot = robot.with_cables(none).with_dashpots(0.1, none).with_harmonics([0.1], [0.0], none)
+    assert robot.tension(cube.positions * 1.1, 0.5) == pytest.approx(
+        cube.tension(cube.positions * 1.1, 0.5)
+    )
+
+
 def test_waveform_fits_and_states_its_error():
     square = ws.Waveform.fit(lambda x: np.sign(np.sin(x)), harmonics=9)
     odd = 4 / np.pi / np.arange(1, 10, 2)

@@ -368,7 +368,8 @@ class Verbs:
         if old is not None:
             tables["factors"], tables["offsets"] = (np.array(part.T) for part in old.at(every))
         flat = np.broadcast_to(values, (len(rows), len(times)))
-        tables[column][rows] = [np.interp(every, times, row) for row in flat]
+        courses = [np.interp(every, times, row) for row in flat]
+        tables[column][rows] = np.reshape(courses, (len(rows), len(every)))
         table = Timetable(frozen(every), *map(frozen, tables.values()), float(period))
         return self._with_elements(timetable=table)
 
