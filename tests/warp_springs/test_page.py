@@ -247,6 +247,32 @@ def test_obstacles_and_pushes_are_drawn(browser, result, cube, tmp_path):
     assert page.complaints == []
 
 
+def test_tethers_water_and_held_masses_are_drawn(browser, cube, tmp_path):
+    def shown(robot, scene):
+        result = ws.Simulation(robot, scene).run(0.2, fps=10)
+        path = ws.export_html(result, tmp_path / "page.html")
+        page = browser.open(path.as_uri(), size=(800, 500))
+        page.wait("document.body.dataset.state === 'ready'")
+        page.key("Home")
+        seen = settled(page)[40:370, :500].astype(int)
+        assert page.complaints == []
+        return seen[..., 0], seen[..., 1], seen[..., 2]
+
+    still_air = ws.Scene(gravity=(0.0, 0.0, 0.0))
+    up = cube.moved((0.0, 0.0, 0.2))
+    red, green, blue = shown(up.tethered([0], 1.0, point=(0.0, 0.0, 0.45)), still_air)
+    assert ((red - blue > 110) & (green - blue > 30)).sum() > 30, "the rope is orange"
+    red, green, blue = shown(up, still_air)
+    dry = np.stack((red, green, blue))
+    assert not ((red - blue > 110) & (green - blue > 30)).any()
+    black = (dry.max(axis=0) < 50).sum()
+    red, green, blue = shown(up.fixed(), still_air)
+    assert (np.maximum(np.maximum(red, green), blue) < 50).sum() < 0.2 * black, "they are grey"
+    sea = ws.Scene(gravity=(0.0, 0.0, 0.0), water=ws.Water(level=0.25))
+    wet = np.stack(shown(up, sea))
+    assert wet[2].mean() - wet[0].mean() > dry[2].mean() - dry[0].mean() + 20, "water is blue"
+
+
 def test_nothing_in_a_text_escapes_into_the_page(result):
     evil = "</script><script>alert(1)</script>"
     text = ws.html_page(result, title=evil, names={0: evil}, custom_data={0: {evil: evil}})

@@ -272,6 +272,37 @@ def test_pushes_are_arrows_while_they_last(result, tmp_path):
     assert np.ptp(lengths[-1:]) == 0 and lengths[-1] == pytest.approx(2 * lengths[0], rel=1e-5)
 
 
+def test_tethers_hold_mass_and_point_and_water_has_a_surface(result, tmp_path):
+    cube = result.robots[0].tethered([3], 50.0, point=(0.1, 0.2, 0.9), start=0.1, end=0.29)
+    scene = dataclasses.replace(result.scene, water=ws.Water(level=0.15))
+    held = dataclasses.replace(result, robots=(cube, result.robots[1]), scene=scene)
+    path = ws.export_usd(held, tmp_path / "t.usdc", grid=False)
+    assert validation_errors(path) == []
+    stage = opened(path)
+    rope, peg = stage.GetPrimAtPath("/World/Tethers").GetChildren()
+    for frame, simulated in enumerate(result.frames(0)):
+        shown = UsdGeom.Imageable(rope).ComputeVisibility(frame) != "invisible"
+        assert shown == (3 <= frame <= 8), frame
+        if shown:
+            points, sides = world_points(rope, frame), 9
+            ends = points[:sides].mean(axis=0), points[sides:].mean(axis=0)
+            np.testing.assert_allclose(ends, [simulated[3], (0.1, 0.2, 0.9)], atol=1e-5)
+    np.testing.assert_allclose(world_points(peg, 5).mean(axis=0), (0.1, 0.2, 0.9), atol=1e-5)
+    water = world_points(stage.GetPrimAtPath("/World/Water"), 0)
+    np.testing.assert_allclose(water[:, 2], 0.15, atol=1e-6)
+    assert np.ptp(water[:, 0]) > 1.0 and np.ptp(water[:, 1]) > 1.0
+
+
+def test_far_away_robots_are_still_where_they_were(result, tmp_path):
+    far = [robot.moved((5e4, 0.0, 0.0)) for robot in result.robots]
+    gone = ws.Simulation(far, result.scene).run(0.1, fps=FPS)
+    stage = opened(ws.export_usd(gone, tmp_path / "far.usdc", grid=False))
+    for index, robot in enumerate(robots_of(stage)):
+        np.testing.assert_allclose(
+            mass_positions(stage, robot, 2), gone.frames(index)[2], atol=5e-5
+        )
+
+
 def camera_sees(stage, path, points, frame):
     frustum = UsdGeom.Camera(stage.GetPrimAtPath(path)).GetCamera(frame).frustum
     return all(frustum.Intersects(Gf.Vec3d(*point)) for point in points)

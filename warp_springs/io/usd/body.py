@@ -41,6 +41,7 @@ class Body(ABC):
         radii: Of the bars and of the balls [m].
         detail: How finely they are meshed.
         bent: Whether its masses turn on their own, so that bars stay round where it bends.
+        far: Whether it goes so far that its place needs double precision.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class Body(ABC):
         radii: tuple[float, float],
         detail: Detail,
         bent: bool,
+        far: bool,
     ) -> None:
         self._path = xform.GetPath()
         self._stage: Usd.Stage = xform.GetPrim().GetStage()
@@ -63,7 +65,9 @@ class Body(ABC):
         self._turned: FloatArray | None = None
         self._boxes: list[FloatArray] = []
         self._shown: IntArray | None = None
-        self._translate, self._orient = xform.AddTranslateOp(), xform.AddOrientOp()
+        precision = UsdGeom.XformOp.PrecisionDouble if far else UsdGeom.XformOp.PrecisionFloat
+        self._points = Vt.Vec3dArray if far else Vt.Vec3fArray
+        self._translate, self._orient = xform.AddTranslateOp(precision), xform.AddOrientOp()
         self._colors: Usd.Attribute | None = None
         self._build()
 
@@ -126,7 +130,7 @@ class Body(ABC):
 
     def _write_moves(self, first: int, centres: FloatArray, turns: FloatArray) -> None:
         moves = zip(
-            Vt.Vec3dArray.FromNumpy(np.ascontiguousarray(centres)),
+            self._points.FromNumpy(np.ascontiguousarray(centres)),
             Vt.QuatfArray.FromNumpy(turns.astype(np.float32)),
             strict=True,
         )

@@ -49,6 +49,8 @@ MOST_JOINTS = 1000
 _FINE = 4000
 """Masses and springs of a file up to which they are finely meshed; beyond, size counts more."""
 _SUFFIXES = (".usdc", ".usda", ".usdz")
+_NEAR = 64.0
+"""Way from the origin in m up to which single precision places a robot to within 4 um."""
 _BLOCK_BYTES = 2_000_000
 """Memory in which frames of a robot are worked out at a time."""
 _SAVE_BYTES = 16_000_000
@@ -90,7 +92,8 @@ def export_usd(
     The stage is z up, in metres, one time code for each recorded frame. Each robot is an animated
     Xform over its bars, balls at its masses and its exterior faces as a skin. A scene with a ground
     gets a checker floor, drawn below z = 0 by the radius of a ball so that balls rest on it;
-    obstacles are drawn where they are, and pushes as arrows while they last. ``/World/Camera`` sees
+    obstacles are drawn where they are, water as a clear surface, pushes as arrows and tethers as
+    thin bars while they last. ``/World/Camera`` sees
     every robot in every frame, ``/World/FollowCamera`` goes with them. A robot that was stopped
     stays as it was; its custom data say when and why. The version and the parameters of the
     simulation are in the layer's custom data, under ``warp_springs``.
@@ -205,6 +208,9 @@ def _add_surroundings(stage: Usd.Stage, looks: Looks, result: Result, drawn: lis
         middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
         ball = max(item.ball for item in tracks)
         usd_scenery.add_ground(stage, looks, middle, distance, tile, ball)
+    if result.scene.water is not None:
+        middle = 0.5 * (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0))
+        usd_scenery.add_water(stage, looks, result.scene.water.level, middle, distance)
     usd_scenery.add_obstacles(stage, looks, result.scene, tracks, offsets)
     usd_scenery.add_lights(stage, distance)
 
@@ -218,7 +224,7 @@ def _write_motion(
     saver: _Saver,
 ) -> float:
     """Write one robot in blocks of frames; returns the tension of the full stress colour [N]."""
-    from warp_springs.io.usd.scenery import add_pushes
+    from warp_springs.io.usd.forces import add_pushes, add_tethers
 
     item, frames = each.item, np.asarray(result.frames(each.item.index))
     radii = (item.bar, item.ball)
@@ -226,10 +232,10 @@ def _write_motion(
     sample = _spread(len(frames), most)
     scale = appearance.stress_scale(_tension(each, frames, sample))
     bent = each.geometry != "points" and _bends(each.robot, frames[item.source[sample]])
-    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail, bent)
-    add_pushes(
-        xform.GetPrim().GetStage(), looks, item, frames, each.offset, xform.GetPrim().GetName()
-    )
+    far = bool(np.abs(item.box + each.offset).max() > _NEAR)
+    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail, bent, far)
+    for add in (add_pushes, add_tethers):
+        add(xform.GetPrim().GetStage(), looks, item, frames, each.offset, xform.GetPrim().GetName())
     step = max(1, _BLOCK_BYTES // body.bytes_a_frame)
     for first in range(0, len(frames), step):
         block = np.arange(first, min(first + step, len(frames)))

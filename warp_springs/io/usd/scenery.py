@@ -1,4 +1,4 @@
-"""What stands around the robots of a stage: the floor, obstacles, pushes as arrows, and lights."""
+"""What stands around the robots of a stage: the floor, water, obstacles, and lights."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 # Only the exporter imports this module, when it has something to write.
 from pxr import Gf, Usd, UsdGeom, UsdLux  # noqa: TID253
 
-from warp_springs.io.usd.geometry import Part, arrow, checker
+from warp_springs.io.usd.geometry import Part, checker
 from warp_springs.io.usd.layout import Track
 from warp_springs.io.usd.stage import (
     OBSTACLES,
-    PUSHES,
+    WATER_OPACITY,
     WORLD,
     Looks,
     add_subsets,
@@ -32,12 +32,6 @@ FloatArray = NDArray[np.float64]
 _FLOOR_PER_DISTANCE = 2.8
 _MOST_TILES = 80
 """Between the middle of the floor and its edge."""
-_ARROW = 0.5
-"""Length of the arrow of the largest push, in diagonals of its robot."""
-_MOST_ARROWS = 16
-"""Arrows of one push: a push on a whole body is shown on some of its masses."""
-_HIDDEN = 1e-3
-"""Scale of an arrow while its push does not act, for viewers that do not animate visibility."""
 
 
 def add_ground(
@@ -62,6 +56,29 @@ def add_ground(
     constant_color(ground, appearance.GROUND_LIGHT)
     light, dark = np.flatnonzero(~dark), np.flatnonzero(dark)
     add_subsets(ground, {"Light": (light, looks.ground_light), "Dark": (dark, looks.ground_dark)})
+
+
+def add_water(
+    stage: Usd.Stage, looks: Looks, level: float, middle: FloatArray, distance: float
+) -> None:
+    """The surface of water, as wide as the floor, seen from both sides.
+
+    Args:
+        stage: Where to put it.
+        looks: The materials of the stage.
+        level: Its height [m].
+        middle: Point around which it lies [m], shape (3,).
+        distance: How far from there the camera stands [m].
+    """
+    half = _FLOOR_PER_DISTANCE * distance
+    corners = half * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+    part = Part(corners + np.array([*middle[:2], level]), np.array([[0, 1, 2, 3]]))
+    water = define_mesh(stage, WORLD.AppendChild("Water"), part)
+    water.CreateDoubleSidedAttr(True)
+    Usd.ModelAPI(water).SetKind("component")
+    constant_color(water, appearance.WATER)
+    water.CreateDisplayOpacityPrimvar(UsdGeom.Tokens.constant).Set([WATER_OPACITY])
+    bind(water, looks.water)
 
 
 def add_lights(stage: Usd.Stage, distance: float) -> None:
@@ -141,67 +158,3 @@ def _smaller(obstacle, ball: float):
         x, y, z = obstacle.origin
         return replace(obstacle, origin=(x, y, z - ball))
     raise TypeError(f"obstacles: got {type(obstacle).__name__}, which cannot be drawn")
-
-
-def add_pushes(
-    stage: Usd.Stage, looks: Looks, item: Track, frames: FloatArray, offset: FloatArray, name: str
-) -> None:
-    """An arrow at each mass that is pushed, while it is.
-
-    Args:
-        stage: Where to put them.
-        looks: The materials of the stage.
-        item: The robot.
-        frames: Its positions in the frames of the result [m], shape (F, M, 3).
-        offset: Where it was moved [m], shape (3,).
-        name: Its name in the stage.
-    """
-    pushes = [push for push in item.robot.elements.pushes if any(push.force)]
-    if not pushes:
-        return
-    if not stage.GetPrimAtPath(PUSHES):
-        Usd.ModelAPI(UsdGeom.Xform.Define(stage, PUSHES)).SetKind("group")
-    largest = max(np.linalg.norm(push.force) for push in pushes)
-    size = float(np.linalg.norm(item.high[0] - item.low[0]))
-    for number, push in enumerate(pushes):
-        vector = _ARROW * size / largest * np.array(push.force)
-        acting = (item.times >= push.start) & (item.times < push.end)
-        if not acting.any():  # shorter than a frame, or over before the first
-            if not item.times[0] <= push.start <= item.times[-1]:
-                continue
-            acting[np.abs(item.times - push.start).argmin()] = True
-        part = arrow(vector, item.bar)
-        chosen = np.unique(np.linspace(0, len(push.masses) - 1, _MOST_ARROWS).round().astype(int))
-        for mass in np.array(push.masses)[chosen].tolist():
-            mesh = define_mesh(stage, PUSHES.AppendChild(f"{name}_push{number}_m{mass}"), part)
-            constant_color(mesh, appearance.PUSH)
-            bind(mesh, looks.push)
-            _animate_arrow(mesh, item, frames, acting, mass, vector, offset)
-
-
-def _animate_arrow(
-    mesh: UsdGeom.Mesh,
-    item: Track,
-    frames: FloatArray,
-    acting: NDArray[np.bool_],
-    mass: int,
-    vector: FloatArray,
-    offset: FloatArray,
-) -> None:
-    """Let an arrow go with its mass, and be seen while its push acts."""
-    at = np.asarray(frames[:, mass], np.float64)[item.source]
-    begin = int(acting.argmax())
-    # What pulls starts at the mass, what pushes ends there: the arrow lies outside the body.
-    middle = 0.5 * (item.low[begin] + item.high[begin])
-    at = at + offset - (vector if vector @ (at[begin] - middle) < 0.0 else 0.0)
-    move, scale, seen = mesh.AddTranslateOp(), mesh.AddScaleOp(), mesh.CreateVisibilityAttr()
-    tokens = {True: UsdGeom.Tokens.inherited, False: UsdGeom.Tokens.invisible}
-    move.Set(Gf.Vec3d(*at[begin]))
-    scale.Set(Gf.Vec3f(1.0 if acting[0] else _HIDDEN))
-    seen.Set(tokens[bool(acting[0])])
-    changes = np.flatnonzero(np.diff(acting))  # the frame before a change, and the one after
-    for time in sorted({0, *changes.tolist(), *(changes + 1).tolist()}):
-        scale.Set(Gf.Vec3f(1.0 if acting[time] else _HIDDEN), time)
-        seen.Set(tokens[bool(acting[time])], time)
-    for time in np.flatnonzero(acting).tolist():
-        move.Set(Gf.Vec3d(*at[time]), time)

@@ -21,6 +21,7 @@ WORLD = Sdf.Path("/World")
 ROBOTS = WORLD.AppendChild("Robots")
 OBSTACLES = WORLD.AppendChild("Obstacles")
 PUSHES = WORLD.AppendChild("Pushes")
+TETHERS = WORLD.AppendChild("Tethers")
 SCENERY = (
     "World",
     "Robots",
@@ -28,6 +29,8 @@ SCENERY = (
     "Ground",
     "Obstacles",
     "Pushes",
+    "Tethers",
+    "Water",
     "Lights",
     "Key",
     "Sky",
@@ -37,6 +40,8 @@ SCENERY = (
 )
 """Names of prims that no robot may take."""
 
+WATER_OPACITY = 0.45
+"""Of the surface of water."""
 _LOOKS = WORLD.AppendChild("Looks")
 _COLOR_PRIMVAR = "displayColor"
 
@@ -51,6 +56,7 @@ class Looks(NamedTuple):
     ground_dark: UsdShade.Material
     obstacle: UsdShade.Material
     push: UsdShade.Material
+    water: UsdShade.Material
     kinds: Mapping[str, UsdShade.Material]
 
 
@@ -86,6 +92,7 @@ def add_looks(stage: Usd.Stage, kinds: Mapping[str, Rgb]) -> Looks:
         ground_dark=_material(stage, "GroundDark", appearance.GROUND_DARK, 0.9),
         obstacle=_material(stage, "Obstacle", appearance.OBSTACLE, 0.9),
         push=_material(stage, "Push", appearance.PUSH, 0.5),
+        water=_material(stage, "Water", appearance.WATER, 0.1, WATER_OPACITY),
         kinds={name: _material(stage, f"Bars_{name}", rgb, 0.5) for name, rgb in kinds.items()},
     )
     _read_color(stage, looks.bars, _COLOR_PRIMVAR, appearance.NEUTRAL)
@@ -144,7 +151,9 @@ def ints(values: ArrayLike) -> Vt.IntArray:
     return Vt.IntArray.FromNumpy(np.ascontiguousarray(values, dtype=np.int32))
 
 
-def _material(stage: Usd.Stage, name: str, color: Rgb, roughness: float) -> UsdShade.Material:
+def _material(
+    stage: Usd.Stage, name: str, color: Rgb, roughness: float, opacity: float = 1.0
+) -> UsdShade.Material:
     """A UsdPreviewSurface of one linear RGB colour."""
     material = UsdShade.Material.Define(stage, _LOOKS.AppendChild(name))
     shader = UsdShade.Shader.Define(stage, material.GetPath().AppendChild("Surface"))
@@ -152,6 +161,8 @@ def _material(stage: Usd.Stage, name: str, color: Rgb, roughness: float) -> UsdS
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*color))
     shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
     shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
+    if opacity < 1.0:
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(opacity)
     material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
     return material
 

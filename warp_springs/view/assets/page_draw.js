@@ -21,7 +21,12 @@ class Painter {
     this.values = { stress: this.colorTexture("stress"), actuation: this.colorTexture("actuation") };
     this.makeBodies();
     this.solids = scene.solids.map((solid) => this.makeSolid(solid.mesh, scene.colors.obstacle, solid));
-    this.arrow = this.makeSolid(arrowMesh(), scene.colors.push);
+    const round = { center: [0, 0, 0] };
+    this.signs = {  // of forces
+      arrow: this.makeSolid(arrowMesh(), scene.colors.push),
+      rope: this.makeSolid(tubeMesh(10), scene.colors.push),
+      peg: this.makeSolid(ballMesh(9, 14), scene.colors.push, round),
+    };
   }
 
   program(vertex, fragment) {
@@ -119,13 +124,19 @@ class Painter {
       firstMass += robot.masses * frames;
       firstSpring += robot.springs * frames;
       const tints = new Uint8Array(robot.springs * 3);
-      robot.material.forEach((m, i) => tints.set(scene.materials[m].color.map((c) => Math.round(255 * c)), 3 * i));
+      robot.material.forEach((m, i) => tints.set(bytes(scene.materials[m].color), 3 * i));
       body.bars = this.vertexArray(() => {
         this.attribute(0, tubeBuffer, 3, gl.FLOAT);
         this.attribute(1, this.buffer(new Int32Array(robot.ends)), 2, gl.INT, 1);
         this.attribute(2, this.buffer(tints), 3, gl.UNSIGNED_BYTE, 1);
       });
-      body.balls = this.vertexArray(() => this.attribute(0, ballBuffer, 3, gl.FLOAT));
+      const paints = new Uint8Array(robot.masses * 3);
+      const held = new Set(robot.held);
+      for (let i = 0; i < robot.masses; i++) paints.set(bytes(held.has(i) ? scene.colors.held : scene.colors.mass), 3 * i);
+      body.balls = this.vertexArray(() => {
+        this.attribute(0, ballBuffer, 3, gl.FLOAT);
+        this.attribute(1, this.buffer(paints), 3, gl.UNSIGNED_BYTE, 1);
+      });
       body.skin = this.vertexArray(() => this.attribute(0, this.buffer(new Int32Array(robot.corners)), 1, gl.INT));
       return body;
     });
@@ -159,7 +170,8 @@ class Painter {
   }
 
   // `moment`: {a, b, blend} two frames and the way between them; `look`: {color, skin}.
-  draw(camera, moment, look, box, arrows) {
+  // `signs`: [kind, matrix] of every arrow, rope and peg.
+  draw(camera, moment, look, box, signs) {
     const { gl, canvas, scene } = this;
     const density = Math.min(window.devicePixelRatio || 1, 2) * this.sharpness;
     const width = Math.max(1, Math.round(canvas.clientWidth * density));
@@ -172,6 +184,7 @@ class Painter {
     const tall = Math.min(box.high[2] - (scene.floor ?? box.low[2]), 2 * radius);
     const shared = {
       camera: camera.matrix(aspect), eye: camera.eye, sun: SUN, sunView,
+      ...this.distances(camera),
       sunSize: [SUN_SPREAD, 2 * radius, clamp(SUN_SPREAD * 1.2 * tall / (2 * radius), 1.5 / this.shadowSize, 0.06)],
     };
     gl.enable(gl.DEPTH_TEST);
@@ -183,13 +196,24 @@ class Painter {
     const depthView = sunView.map((v, i) => 2 * v - ([3, 7, 11].includes(i) ? 0 : i % 4 < 3 && i > 11 ? 1 : 0));
     depthView[15] = 1;
     this.bind(null);
-    this.things("Depth", { camera: depthView }, moment, look, arrows);
+    this.things("Depth", { camera: depthView }, moment, look, signs);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, width, height);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     this.bind(this.depths);
     this.backdrop(camera, shared, aspect);
-    this.things("", shared, moment, look, arrows);
+    this.things("", shared, moment, look, signs);
+  }
+
+  // What becomes of light on its way to the eye.
+  distances(camera) {
+    const { scene } = this;
+    const clear = 5;  // tiles of the floor after which 1 / e of the light comes through water
+    return {
+      floorAt: [scene.floor ?? 0, scene.tile, 2.2 * camera.distance, 2.6 * camera.distance],
+      horizon: scene.colors.sky, water: [...scene.colors.water, clear * scene.tile],
+      eyeAbove: scene.water === null ? -1 : camera.eye[2] - scene.water,
+    };
   }
 
   bind(depths) {
@@ -210,15 +234,13 @@ class Painter {
     const slope = Math.tan(FIELD_OF_VIEW / 2);
     this.use("backdrop", {
       ...shared, right: scaled(right, slope * aspect), up: scaled(up, slope), back,
-      floorAt: [scene.floor ?? 0, scene.tile, 2.2 * camera.distance, 2.6 * camera.distance],
-      hasFloor: scene.floor !== null, light: colors.groundLight, dark: colors.groundDark,
-      horizon: colors.sky, zenith: colors.zenith,
+      hasFloor: scene.floor !== null, light: colors.groundLight, dark: colors.groundDark, zenith: colors.zenith,
     });
     gl.bindVertexArray(null);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 3);
   }
 
-  things(kind, shared, moment, look, arrows) {
+  things(kind, shared, moment, look, signs) {
     const { gl, scene } = this;
     const { colors } = scene;
     gl.activeTexture(gl.TEXTURE1);
@@ -236,7 +258,7 @@ class Painter {
         gl.bindVertexArray(body.bars);
         gl.drawArraysInstanced(gl.TRIANGLES, 0, body.tubeCount, robot.springs);
       }
-      this.use("balls" + kind, { ...own, radius: robot.ball, paint: colors.mass, gloss: 0.35 });
+      this.use("balls" + kind, { ...own, radius: robot.ball, gloss: 0.35 });
       gl.bindVertexArray(body.balls);
       gl.drawArraysInstanced(gl.TRIANGLES, 0, body.ballCount, robot.masses);
       if (look.skin && robot.corners.length) {
@@ -246,7 +268,7 @@ class Painter {
       }
     }
     for (const solid of this.solids) for (const at of solid.at) this.solid(kind, shared, solid, moved(at));
-    for (const turn of arrows) this.solid(kind, shared, this.arrow, turn);
+    for (const [sign, turn] of signs) this.solid(kind, shared, this.signs[sign], turn);
   }
 
   solid(kind, shared, solid, turn) {
@@ -272,6 +294,10 @@ class Painter {
 }
 
 const UNITS = { positions: 0, values: 1, shadow: 2, depths: 3 };
+
+function bytes(color) {
+  return color.map((c) => Math.round(255 * c));
+}
 
 function moved([x, y, z]) {
   return new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]);

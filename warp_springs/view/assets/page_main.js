@@ -275,7 +275,7 @@ class Show {
     const { moment } = this;
     this.goAlong();
     const look = { color: $("color").value, skin: $("skin").checked };
-    this.painter.draw(this.camera, moment, look, this.shownBox(moment), this.arrows(moment));
+    this.painter.draw(this.camera, moment, look, this.shownBox(moment), this.signs(moment));
     $("time").value = this.time;
     $("clock").textContent = (this.scene.times[0] + this.time).toFixed(2) + " s";
     const share = this.duration ? this.time / this.duration : 0;
@@ -284,8 +284,16 @@ class Show {
     this.placeLabels(moment);
   }
 
-  // The pushes that act now.
-  arrows(moment) {
+  // Where mass `i` of a robot is.
+  massAt({ a, b, blend }, robot, i) {
+    return [0, 1, 2].map((k) => {
+      const p = (frame) => robot.motion[(frame * robot.masses + i) * 3 + k];
+      return robot.center[k] + robot.quantum * (p(a) + blend * (p(b) - p(a)));
+    });
+  }
+
+  // Arrows of the pushes that act now, ropes and pegs of the tethers that hold.
+  signs(moment) {
     const t = this.scene.times[0] + this.time;
     const found = [];
     this.scene.robots.forEach((robot, r) => {
@@ -293,14 +301,17 @@ class Show {
       for (const push of robot.pushes) {
         if (t < push.start || t > push.end) continue;
         for (const i of push.masses) {
-          const at = [0, 1, 2].map((k) => {
-            const p = (frame) => robot.motion[(frame * robot.masses + i) * 3 + k];
-            return robot.center[k] + robot.quantum * (p(moment.a) + moment.blend * (p(moment.b) - p(moment.a)));
-          });
+          const at = this.massAt(moment, robot, i);
           // It lies outside the body, where it is seen: it starts at the mass, or it ends there.
           const outwards = dot(push.arrow, sub(at, middle)) >= 0;
-          found.push(arrowMatrix(outwards ? at : sub(at, push.arrow), push.arrow));
+          found.push(["arrow", alongMatrix(outwards ? at : sub(at, push.arrow), push.arrow)]);
         }
+      }
+      for (const { mass, point, start, end } of robot.tethers) {
+        if (t < start || t > end) continue;
+        const at = this.massAt(moment, robot, mass);
+        found.push(["rope", alongMatrix(at, sub(point, at), 0.35 * robot.bar)]);
+        found.push(["peg", alongMatrix(point, [0, 0, 0.6 * robot.ball])]);
       }
     });
     return found;

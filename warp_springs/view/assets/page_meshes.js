@@ -38,13 +38,13 @@ function arrowMesh() {
   return mesh;
 }
 
-// The matrix that puts an arrow from a point along a vector.
-function arrowMatrix(from, vector) {
-  const length = Math.hypot(...vector);
+// The matrix that puts a mesh of length one along +z from a point along a vector, so much as wide.
+function alongMatrix(from, vector, wide = Math.hypot(...vector)) {
+  const length = Math.hypot(...vector) || 1e-9;
   const z = scaled(vector, 1 / length);
   const x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z));
   const y = cross(z, x);
-  return new Float32Array([...scaled(x, length), 0, ...scaled(y, length), 0, ...vector, 0, ...from, 1]);
+  return new Float32Array([...scaled(x, wide), 0, ...scaled(y, wide), 0, ...vector, 0, ...from, 1]);
 }
 
 function flatNormals(mesh) {

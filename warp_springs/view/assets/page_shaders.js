@@ -44,14 +44,14 @@ void main() {
 
 const BALLS = `
 layout(location = 0) in vec3 shape;   // on the unit sphere
+layout(location = 1) in vec3 tint;
 uniform mat4 camera;
 uniform float radius;
-uniform vec3 paint;
 out vec3 world, normal, color;
 ${MASSES}
 void main() {
   normal = shape;
-  color = paint;
+  color = tint;
   world = mass(gl_InstanceID) + radius * shape;
   gl_Position = camera * vec4(world, 1);
 }`;
@@ -90,6 +90,22 @@ uniform sampler2DShadow shadow;
 uniform sampler2D depths;
 uniform vec3 sunSize;   // half width of the blur a metre behind the edge, sun's view [m], longest blur
 vec3 screen(vec3 c) { return mix(12.92 * c, 1.055 * pow(max(c, 0.0), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c)); }
+uniform vec3 horizon;
+uniform vec4 floorAt;    // its height, side of a tile, where fading begins, half way of it [m]
+uniform vec4 water;      // its colour; way after which 1 / e of the light is left [m]
+uniform float eyeAbove;  // height of the eye above its surface [m]; below 0: no surface is seen
+vec3 faded(vec3 c, float way) {
+  float away = max(way - floorAt.z, 0.0) / floorAt.w;
+  return mix(c, horizon, away * away / (1.0 + away * away));
+}
+// A colour as it is seen through the surface of water, if it lies below.
+vec3 below(vec3 c, vec3 p) {
+  float fall = eye.z - p.z, way = length(p - eye);
+  if (eyeAbove < 0.0 || fall <= eyeAbove) return c;
+  float share = eyeAbove / fall, grazing = 1.0 - fall / way;
+  vec3 seen = mix(water.rgb, c, 0.72 * exp(-way * (1.0 - share) / water.w));
+  return faded(mix(seen, horizon, 0.05 + 0.6 * grazing * grazing * grazing), way * share);
+}
 bool outside(vec3 s) { return any(lessThan(s, vec3(0.002))) || any(greaterThan(s, vec3(0.998))); }
 `;
 
@@ -114,7 +130,8 @@ void main() {
   float light = facing > 0.0 ? lit(world, n) : 0.0;
   vec3 sky = mix(vec3(0.30, 0.29, 0.28), vec3(0.46, 0.50, 0.56), 0.5 + 0.5 * n.z);
   float shine = pow(max(dot(n, normalize(sun + toEye)), 0.0), 48.0) * gloss * light;
-  result = vec4(screen(color * (sky + vec3(0.74, 0.71, 0.66) * (facing * light)) + shine), 1);
+  vec3 seen = color * (sky + vec3(0.74, 0.71, 0.66) * (facing * light)) + shine;
+  result = vec4(screen(below(seen, world)), 1);
 }`;
 
 const NOTHING = "out vec4 result; void main() { result = vec4(1); }";
@@ -131,9 +148,8 @@ const BACKDROP = `
 in vec2 at;
 uniform mat4 camera;
 uniform vec3 right, up, back;   // the camera's axes, the first two as long as half the picture
-uniform vec4 floorAt;           // its height, side of a tile, where fading begins, half way of it [m]
 uniform bool hasFloor;
-uniform vec3 light, dark, horizon, zenith;
+uniform vec3 light, dark, zenith;
 out vec4 result;
 ${LIGHT}
 float hidden(vec3 p) {
@@ -167,10 +183,9 @@ void main() {
   vec3 p = eye + t * d;
   vec3 tile = mix(light, dark, checker(p.xy / floorAt.y));
   gl_FragDepth = 0.9999999;
-  if (!hasFloor || d.z >= -1e-6) { result = vec4(screen(sky), 1); return; }
-  float away = max(t * length(d) - floorAt.z, 0.0) / floorAt.w;
-  tile *= 1.0 - 0.62 * hidden(p);
-  result = vec4(screen(mix(tile, sky, away * away / (1.0 + away * away))), 1);
+  if (!hasFloor || d.z >= -1e-6) { result = vec4(screen(d.z < -1e-6 ? below(sky, eye + 1e4 * d) : sky), 1); return; }
+  tile = faded(tile * (1.0 - 0.62 * hidden(p)), t * length(d));
+  result = vec4(screen(below(tile, p)), 1);
   vec4 c = camera * vec4(p, 1);
   gl_FragDepth = clamp(0.5 + 0.5 * c.z / c.w + 1e-6, 0.0, 0.9999999);
 }`;

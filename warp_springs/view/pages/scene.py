@@ -30,6 +30,8 @@ _NO_ACTUATION = 1e-9
 """Share of a rest length below which a change is only rounding."""
 _ARROW = 0.5
 """Length of the arrow of the largest push in diameters of its robot."""
+_ENDLESS = 1e9
+"""Instead of infinity, which JSON has not [s]."""
 ENERGIES = ("kinetic", "gravity", "spring", "ground", "residual")
 """The energies that the page plots."""
 
@@ -83,6 +85,7 @@ def described(
     header = {
         "times": [round(float(t), 6) for t in result.times],
         "floor": None if result.scene.ground is None else -largest,
+        "water": None if result.scene.water is None else result.scene.water.level,
         "tile": appearance.tile_size(
             [np.linalg.norm(item.high[0] - item.low[0]) for item in tracks]
         ),
@@ -99,6 +102,7 @@ def described(
                 **_motion(result, item, offset, block),
                 **_plots(result, item, block),
                 "pushes": _pushes(item),
+                "tethers": _tethers(item, offset),
             }
             for item, offset, label in zip(tracks, offsets, labels, strict=True)
         ],
@@ -116,6 +120,7 @@ def _body(item: Track, block: Block) -> dict[str, Any]:
         "springs": robot.n_springs,
         "bar": bar,
         "ball": ball,
+        "held": robot.elements.bonds.masses.tolist(),
         "ends": block.add(robot.springs, index),
         "corners": block.add(robot.faces, index),
     }
@@ -181,10 +186,23 @@ def _pushes(item: Track) -> list[dict[str, Any]]:
         {
             "masses": list(push.masses),
             "start": push.start,
-            "end": min(push.end, 1e9),  # JSON has no infinity
+            "end": min(push.end, _ENDLESS),
             "arrow": (_ARROW * item.robot.diameter / largest * np.array(push.force)).tolist(),
         }
         for push in pushes
+    ]
+
+
+def _tethers(item: Track, offset: NDArray) -> list[dict[str, Any]]:
+    """The temporary springs that hold a robot to points in space."""
+    return [
+        {
+            "mass": tether.mass,
+            "point": (np.array(tether.point) + offset).tolist(),
+            "start": tether.start,
+            "end": min(tether.end, _ENDLESS),
+        }
+        for tether in item.robot.elements.tethers
     ]
 
 
@@ -234,6 +252,8 @@ def _colors() -> dict[str, Any]:
         "longer": appearance.LONGER,
         "shorter": appearance.SHORTER,
         "mass": appearance.MASS,
+        "held": appearance.HELD,
+        "water": appearance.WATER,
         "skin": appearance.SKIN,
         "groundLight": appearance.GROUND_LIGHT,
         "groundDark": appearance.GROUND_DARK,
