@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evolve.errors import RunError
-from evolve.fitness import UNITS
-from evolve.reports.bodies import shown
 from evolve.reports.comparison import Group, compare, groups
 from evolve.reports.diversity import diversity, diversity_plot
-from evolve.reports.export import FILM_CYCLES, ZOO_SIZE, trial
 from evolve.reports.family import family
 from evolve.reports.figures import clock, demotions, describe, metric, results, verdict
 from evolve.reports.findings import findings
 from evolve.reports.parameters import parameters
 from evolve.reports.plots import dot_plot, figure, learning_curve, performance
+from evolve.reports.subject import Subject, examine, share
 from evolve.reports.tables import write_table
+from evolve.reports.watch import watch
 from evolve.run import Run
-from evolve.store import Finalist, Record, Store
+from evolve.store import Store
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -61,28 +59,6 @@ CHAMPION_PLOTS = (
 """Of the best robot, two in a row: name in `warp_springs.plots`, caption."""
 
 
-@dataclass(frozen=True)
-class Subject:
-    """The run that a report is about, and what was found of it."""
-
-    run: Run
-    record: Record
-    finalists: Sequence[Finalist]
-    zoo: Sequence[int]
-    """Ids of the best, the champion first."""
-    film: ws.Result
-    """Their whole trial, with energies, in the order of the zoo."""
-
-    @property
-    def unit(self) -> str:
-        """Of the fitness."""
-        return UNITS[self.run.config.task.fitness]
-
-    def fitness(self, individual: int) -> float:
-        """Fitness of an individual at the first look."""
-        return float(self.record.fitness[np.searchsorted(self.record.ids, individual)])
-
-
 def write_report(
     runs: Sequence[Run],
     path: Path | None = None,
@@ -118,13 +94,13 @@ def write_report(
                     f"{other.directory} has no complete generation yet: nothing to report"
                 )
     progress("simulating the best again")
-    subject = _subject(run)
+    subject = examine(run)
     several = groups(runs)
     report = ws.Document(f"{run.config.name}: report of a run", subtitle=run.config.about)
     with run.read() as store:
         _summary(report, subject, store)
         progress("filming")
-        _watch(report, subject)
+        watch(report, subject)
         progress("drawing")
         _learning(report, subject, several, store.costs())
         _champion(report, subject)
@@ -140,18 +116,6 @@ def write_report(
     progress("writing")
     _files(report, run, path)
     return [report.write(path), table]
-
-
-def _subject(run: Run) -> Subject:
-    with run.read() as store:
-        finalists = store.finalists()
-        shows = shown(run, store, finalists, ZOO_SIZE)
-        zoo = [one.id for one in shows] or store.best(ZOO_SIZE)
-        if not zoo:
-            raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to report")
-        record = store.record()
-        film = trial(run, store, zoo, energy=True)
-    return Subject(run, record, finalists, zoo, film)
 
 
 def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
@@ -171,8 +135,8 @@ def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
     tiles = [(f"{config.task.fitness} of the best [{subject.unit}]",
               f"{subject.fitness(subject.zoo[0]):.3f}")]  # fmt: skip
     if first:
-        tiles.append(("left at half the time step", _share(first.halved_kept)))
-        tiles.append(("left from perturbed starts", _share(first.perturbed_kept)))
+        tiles.append(("left at half the time step", share(first.halved_kept)))
+        tiles.append(("left from perturbed starts", share(first.perturbed_kept)))
     tiles += [
         ("evaluations", f"{len(subject.record.ids):,}"),
         ("spring evaluations", metric(springs)),
@@ -181,43 +145,6 @@ def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
     ]
     report.tiles(tiles)
     report.table(list(describe(config)))
-
-
-def _watch(report: ws.Document, subject: Subject) -> None:
-
-    report.section("Watch")
-    film, zoo, cycles = subject.film, subject.zoo, _cycles(subject)
-    duration = _film_duration(subject)
-    part = {"start": float(film.times[-1]) - duration, "duration": duration}
-    films = [report.film(film, f"The best, #{zoo[0]}, {cycles}.", 0, **part)]
-    if len(zoo) > 1:
-        words = f"The {len(zoo)} best side by side, {cycles}."
-        films.append(report.film(film, words, range(len(zoo)), **part))
-    report.row(*films)
-    report.row(
-        report.player(
-            film,
-            "The best, to walk around.",
-            names={place: f"#{individual}" for place, individual in enumerate(zoo)},
-            custom_data=dict(enumerate(_page_facts(subject))),
-            title=f"{subject.run.config.name}: the best",
-        )
-    )
-
-
-def _page_facts(subject: Subject) -> Iterator[dict[str, str]]:
-    """What the page says about each robot of the zoo."""
-    found = {f.id: f for f in subject.finalists}
-    for individual in subject.zoo:
-        facts = {
-            subject.run.config.task.fitness: f"{subject.fitness(individual):.3f} {subject.unit}"
-        }
-        if finalist := found.get(individual):
-            facts["generation"] = f"{finalist.generation:,}"
-            facts["half the step"] = _share(finalist.halved_kept)
-            facts["perturbed"] = _share(finalist.perturbed_kept)
-            facts["second look"] = "survives" if finalist.survives else "demoted"
-        yield facts
 
 
 def _learning(
@@ -285,8 +212,8 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
     if subject.finalists:
         report.table(
             [
-                (f"#{f.id}", f.generation, f.fitness, _share(f.halved_kept),
-                 _share(f.perturbed_kept), "yes" if f.survives else "no")
+                (f"#{f.id}", f.generation, f.fitness, share(f.halved_kept),
+                 share(f.perturbed_kept), "yes" if f.survives else "no")
                 for f in subject.finalists if f.id in subject.zoo
             ],
             ("individual", "generation", subject.run.config.task.fitness, "left at half the step",
@@ -369,16 +296,6 @@ def _files(report: ws.Document, run: Run, path: Path) -> None:
     report.links(links)
 
 
-def _film_duration(subject: Subject) -> float:
-    """Seconds that a film shows: some cycles, or all where there are fewer."""
-    times = subject.film.times
-    return min(FILM_CYCLES * subject.run.config.encoding.period, float(times[-1] - times[0]))
-
-
-def _cycles(subject: Subject) -> str:
-    return f"{_film_duration(subject) / subject.run.config.encoding.period:g} cycles"
-
-
 def _speed_words(subject: Subject) -> str:
     """How fast the best is, in body diameters per cycle and in m/s, over the measurement."""
     config, film = subject.run.config, subject.film
@@ -390,10 +307,6 @@ def _speed_words(subject: Subject) -> str:
     speed = float(np.hypot(*way[:2])) / max(seconds, 1e-12)
     per_cycle = speed * config.encoding.period / robot.diameter
     return f"{per_cycle:.3f} body diameters per cycle, {speed:.3g} m/s"
-
-
-def _share(kept: float) -> str:
-    return "stopped" if np.isnan(kept) else f"{kept:.0%}"
 
 
 def _standard_error(values: np.ndarray) -> str:

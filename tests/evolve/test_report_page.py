@@ -86,7 +86,8 @@ def _exists(url: str) -> bool:
 
 def test_the_films_and_the_page_are_in_it(page, runs):
     films = page.evaluate("document.querySelectorAll('video, img[src*=webp]').length")
-    assert films >= 3, "the best, the best side by side, the zoo"
+    assert films >= 4, "the best, the best side by side, the best dropped, the zoo"
+    assert "dropped from as high as it is long" in words(page)
     lengths = page.evaluate("[...document.querySelectorAll('video')].map(v => v.duration)")
     three = 3.0 * runs[0].config.encoding.period
     assert all(length == pytest.approx(three, abs=0.1) for length in lengths), "three cycles"
