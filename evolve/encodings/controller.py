@@ -44,6 +44,8 @@ class ControllerSettings(ActuationSettings):
     """Distance of a goal that reads as 1, and of a light that reads as one half [m]."""
     amplitude: float = Field(0.25, gt=0.0, lt=1.0)
     """Largest change of a rest length, as a part of it."""
+    mutation_step: float = Field(0.05, gt=0.0)
+    """Standard deviation of a mutation, as a share of a gene's range: networks are touchy."""
 
 
 class ControllerEncoding(ArrayField):
