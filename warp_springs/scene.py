@@ -115,6 +115,8 @@ class Collisions:
 
     Where two come closer than ``thickness`` a temporary spring pushes them apart; it vanishes
     when they part. Features that share a mass, or that a spring joins, do not collide.
+    Friction is a second such spring, along the surface, between the two points that met first: what
+    sticks stays where it is, what slides does so under mu_k.
 
     Attributes:
         thickness: Distance [m] that surfaces keep; 0: 4 % of the median length of the springs.

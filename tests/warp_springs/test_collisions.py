@@ -207,3 +207,27 @@ def test_garbage_ruins_its_own_world_alone(cube, layout):
     assert np.array_equal(result.positions(worlds), alone.positions(0))
     for world in range(worlds):
         assert np.isfinite(result.positions(world)).all()
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat"])
+def test_a_block_on_a_tilted_block_sticks_or_slides(cube, layout):
+    mu_s, mu_k, g = 0.6, 0.4, 9.81
+    block = cube.replace(stiffness=1e4).moved((-0.05, -0.05, 0.01)).moved((-0.5, 0, 0))
+
+    def simulation(robots, angle, damping, kinetic=mu_k):
+        rough = ws.Collisions(thickness=0.01, static_friction=mu_s, kinetic_friction=kinetic)
+        tilted = (g * np.sin(angle), 0.0, -g * np.cos(angle))
+        scene = ws.Scene(gravity=tilted, ground=None, damping=damping, collisions=rough)
+        return ws.Simulation(robots, scene, dt=2.5e-4, world="together", layout=layout)
+
+    sticks = simulation([block, plate(2.0)], 0.9 * np.arctan(mu_s), 20.0, mu_s)
+    before = sticks.run(1.0).positions(0)[:8]
+    assert sticks.run(0.5).positions(0)[:8] == pytest.approx(before, abs=1e-7)
+
+    angle = np.arctan(mu_s) + 0.1
+    level = simulation([block, plate(2.0)], 0.0, 20.0).run(0.5).positions(0)[:8]
+    slides = simulation([block.replace(positions=level), plate(2.0)], angle, 0.0).run(0.4, fps=200)
+    way = slides.frames(0)[:, :8, 0].mean(axis=1)
+    t = slides.times
+    fit = np.linalg.lstsq(np.stack([1 + 0 * t, t, t**2 / 2], axis=1), way, rcond=None)[0]
+    assert fit[2] == pytest.approx(g * (np.sin(angle) - mu_k * np.cos(angle)), rel=0.03)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from warp_springs.kernels.contact import GRIP, GRIPS
 from warp_springs.robot import Robot
 from warp_springs.scene import Collisions
 
-__all__ = ["CONTACT", "PACKED_COLLISIONS", "collision_buffers", "collision_counts"]
+__all__ = ["CONTACT", "PACKED_COLLISIONS", "collision_buffers", "collision_counts", "no_grips"]
 
 #: Buffers of collisions, and the columns of the table of bundles that say where.
 PACKED_COLLISIONS = {
@@ -17,6 +18,8 @@ PACKED_COLLISIONS = {
     "near_rows": "near_row",
     "nears": "near",
     "pair_lists": "pair_list",
+    "grip_partners": "grip_partner",
+    "grips": "grip",
     "listed_positions": "listed",
     "contacts": "contact",
 }
@@ -35,6 +38,11 @@ def surface_edges(robot: Robot) -> np.ndarray:
         return np.asarray(robot.springs)
     sides = np.concatenate([robot.faces[:, [0, 1]], robot.faces[:, [1, 2]], robot.faces[:, [2, 0]]])
     return np.unique(np.sort(sides, axis=1), axis=0)
+
+
+def no_grips(features: int) -> np.ndarray:
+    """For each feature its partners in friction, none, and whether it needed them, not."""
+    return np.tile(np.repeat(np.array([-1, 0], np.int32), GRIPS), features)
 
 
 def collision_counts(robot: Robot) -> dict[str, int]:
@@ -79,6 +87,8 @@ def collision_buffers(
         "near_rows": rows,
         "nears": ends[:, 1],
         "pair_lists": pairs,
+        "grip_partners": no_grips(features),
+        "grips": np.zeros(GRIP * GRIPS * features),
         "listed_positions": np.zeros(3 * masses),
         "contacts": np.array(contact),
     }

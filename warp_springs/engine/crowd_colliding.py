@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warp_springs.engine.colliding import no_grips
 from warp_springs.engine.curve import along_curve, ranges
+from warp_springs.kernels.contact import GRIP, GRIPS
 from warp_springs.kernels.crowd_collisions import MEETING, ROOM
 
 if TYPE_CHECKING:
@@ -62,6 +64,8 @@ def collision_arrays(bodies: Bodies, lists: Lists) -> dict[str, np.ndarray]:
         "fitted_positions": np.full(4 * len(lists.home), np.nan),  # not yet
         "stale": np.zeros(n, np.int32),
         "touched": np.zeros(len(features), np.int32),
+        "grip_partners": no_grips(len(features)),
+        "grips": np.zeros(GRIP * GRIPS * len(features)),
         "feature_forces": np.zeros(12 * len(features)),
     }
 

@@ -85,7 +85,7 @@ auto collide = [&](scalar time, bool rubs) {
     meet();
     if (leader) *flag = 0;
     for (int f = first_feature + thread; f < past_feature; f += THREADS)
-        push_feature(f, now(), base_of(feature_row(f)[0]), time, rubs);
+        push_feature(f, now(), base_of(feature_row(f)[0]), time, rubs, rubs);
     meet();
 };
 #else

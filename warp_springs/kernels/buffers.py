@@ -64,6 +64,8 @@ BUNDLE = (
     "near_row",  # where the neighbours of each mass begin, M + 1
     "near",  # the masses that springs join to each
     "pair_list",  # see kernels.collisions
+    "grip_partner",
+    "grip",
     "listed",  # [3 M]
     "contact",  # see warp_springs.engine.colliding
     "triangles",  # T
@@ -133,6 +135,8 @@ STATE = {
     "worn": REAL,  # how far a spring has flowed, m, and 1, or 0 where it is broken
     "broken_at": np.float64,  # s
     "pair_lists": np.int32,  # pairs that may collide: how many, the sorted features, the pairs
+    "grip_partners": np.int32,  # of each feature, with whom its friction holds, see kernels.contact
+    "grips": REAL,
     "listed_positions": REAL,  # where the masses were when they were looked up
     "states": np.int32,  # Status
     "state_times": np.float64,  # when it was found, s

@@ -22,6 +22,8 @@ const int* const body = model.bodies.data + body_;
 const int* const near_row = model.near_rows.data + near_row_;
 const int* const near = model.nears.data + near_;
 int* const pair_list = state.pair_lists.data + pair_list_;  // count, room for order, pairs
+int* const grip_partners = state.grip_partners.data + grip_partner_;
+scalar* const grips = state.grips.data + grip_;
 scalar* const listed_x = state.listed_positions.data + listed_;
 const scalar* const contact = model.contacts.data + contact_;  // see warp_springs.engine.colliding
 const int T = (int)triangles_, E = (int)edges_, CAPACITY = (int)capacity_;
@@ -129,7 +131,7 @@ auto list_is_stale = [=](const Vec* x) -> bool {
 };
 
 // The temporary spring of a pair, if it is there: forces on its masses into F.
-auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs) {
+auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs, bool keeps) {
     int masses[4];
     Point at[4];
     const int m = masses_of(f, masses);
@@ -138,7 +140,11 @@ auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs) {
     Push pair;
     auto speed_of = [&](int c) -> Point { return point_at(v, masses[c]); };
     auto inverse_of = [&](int c) -> scalar { return w[masses[c]][0]; };
-    if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, pair)) return;
+    auto grip_of = [&](bool& fresh) -> scalar* {
+        const int e = find_grip(grip_partners + 2 * GRIPS * f, g, keeps, fresh);
+        return e < 0 ? nullptr : grips + GRIP * (GRIPS * (int64_t)f + e);
+    };
+    if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, grip_of, keeps, pair)) return;
     collision_energy += pair.energy;
     rub_power += pair.rub;
     soft_power += pair.soft;
@@ -153,18 +159,19 @@ auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs) {
 // `listed`: by the list of candidates, which is looked up anew if need be; a look at the robots
 // takes it only if it still holds, so that it changes nothing.
 auto collide = [&](const Vec* x, scalar time, bool rubs, bool listed) {
-    const bool stale = list_is_stale(x);
+    const bool stale = list_is_stale(x), keeps = listed && rubs;
     if (listed && stale) list_pairs(x);
     collision_energy = rub_power = soft_power = zero;
     const int count = pair_list[0], n = M + T + E;
     const int* const pairs = pair_list + 1 + n;
     if ((listed || !stale) && count <= CAPACITY) {
-        for (int e = 0; e < count; ++e) push_pair(x, pairs[2 * e], pairs[2 * e + 1], time, rubs);
-        return;
-    }
-    for (int f = 0; f < n; ++f)
-        for (int g = f + 1; g < n; ++g)
-            if (may_meet(f, g)) push_pair(x, f, g, time, rubs);
+        for (int e = 0; e < count; ++e)
+            push_pair(x, pairs[2 * e], pairs[2 * e + 1], time, rubs, keeps);
+    } else
+        for (int f = 0; f < n; ++f)
+            for (int g = f + 1; g < n; ++g)
+                if (may_meet(f, g)) push_pair(x, f, g, time, rubs, keeps);
+    for (int f = 0; keeps && f < n; ++f) let_go(grip_partners + 2 * GRIPS * f);
 };
 auto enter_collisions = [&](scalar time) {
     if (!LEDGER) return;

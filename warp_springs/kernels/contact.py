@@ -3,9 +3,19 @@
 Everything here is scalar: a pair at a time, in whatever lanes the rest of a layout computes.
 """
 
-__all__ = ["CONTACT"]
+__all__ = ["CONTACT", "GRIP", "GRIPS"]
 
-CONTACT = r"""
+#: Numbers that the friction of a pair remembers: weights of the points that met, how far apart they
+#: were then, and whether they slide.
+GRIP = 8
+#: Pairs of a feature whose friction is remembered at a time.
+GRIPS = 8
+#: Damping along the surface, as a part of critical damping.
+GRIP_DAMPING = 0.2
+
+CONTACT = (
+    f"const int GRIP = {GRIP}, GRIPS = {GRIPS};\nconst double GRIP_DAMPING = {GRIP_DAMPING};\n"
+    + r"""
 struct Point { scalar x, y, z; };
 auto minus = [](Point a, Point b) -> Point { return Point{a.x - b.x, a.y - b.y, a.z - b.z}; };
 auto grown = [](Point a, scalar s) -> Point { return Point{a.x * s, a.y * s, a.z * s}; };
@@ -70,9 +80,11 @@ auto nearest_of_segments = [=](const Point* a, const Point* b, scalar* wa, scala
 struct Push { scalar weights[4]; Point force; scalar energy, rub, soft; };
 // The first feature has m masses and the second n, m + n = 4 of them `at` their places, with the
 // numbers of `contact` (see warp_springs.engine.colliding), in a kick of `time`; `rubs`: with
-// losses, which ask for the velocity and the inverse mass of each. False: they do not touch.
+// losses, which ask for the velocity and the inverse mass of each. `grip_of` finds what their
+// friction remembers, which is kept up if it `keeps`. False: they do not touch.
 auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time, bool rubs,
-                    auto speed_of, auto inverse_of, Push& pair) -> bool {
+                    auto speed_of, auto inverse_of, auto grip_of, bool keeps,
+                    Push& pair) -> bool {
     scalar* const weights = pair.weights;
     weights[0] = scalar(1);
     if (m == 1) nearest_on_triangle(at[0], at + 1, weights + 1);
@@ -104,15 +116,55 @@ auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time,
     if (push + softer < scalar(0)) softer = -push;  // it never pulls
     pair.soft = -softer * (rate + softer * inverse * time * scalar(0.5));
     const Point slip = minus(u, grown(normal, rate));
-    const scalar speed = root_of(inner(slip, slip));
-    // A quarter of what would stop the slip at once: a mass has several such springs.
-    const scalar stop = speed / (inverse * time) * scalar(0.25), load = push + softer;
-    const scalar rub = stop <= contact[2] * load ? stop
-        : contact[3] * load < stop ? contact[3] * load : stop;
-    pair.rub = rub * (speed - rub * inverse * time * scalar(0.5));  // at the mean speed
-    const scalar along = speed > scalar(0) ? rub / speed : scalar(0);
-    pair.force = Point{normal.x * load - slip.x * along, normal.y * load - slip.y * along,
-                        normal.z * load - slip.z * along};
+    // The grip: a second spring holds together the two points that met first, along the surface. It
+    // gives way beyond static friction and then slides on with kinetic friction.
+    const scalar load = push + softer, drag_along = scalar(2 * GRIP_DAMPING) * root_of(k / inverse);
+    bool fresh = true;
+    scalar* const grip = grip_of(fresh);
+    scalar own[GRIP] = {};
+    for (int e = 0; e < 4; ++e) own[e] = weights[e];
+    for (int e = 0; grip && !fresh && e < GRIP; ++e) own[e] = grip[e];
+    Point way = {-own[4], -own[5], -own[6]};
+    for (int c = 0; c < 4; ++c) {
+        way.x += at[c].x * own[c]; way.y += at[c].y * own[c]; way.z += at[c].z * own[c];
+    }
+    way = grown(minus(way, grown(normal, inner(way, normal))), k);
+    Point rub = {way.x + slip.x * drag_along, way.y + slip.y * drag_along,
+                 way.z + slip.z * drag_along};
+    const scalar most = (own[7] > scalar(0) ? contact[3] : contact[2]) * load;
+    const scalar size = root_of(inner(rub, rub));
+    const bool slides = size > most;
+    if (slides) {
+        const scalar least = contact[3] * load;
+        if (least < size) rub = grown(rub, least / size);
+        for (int e = 0; e < 4; ++e) own[e] = weights[e];
+        own[4] = -rub.x / k; own[5] = -rub.y / k; own[6] = -rub.z / k;
+    }
+    own[7] = slides ? scalar(1) : scalar(0);
+    for (int e = 0; grip && keeps && e < GRIP; ++e) grip[e] = own[e];
+    pair.rub = inner(rub, slip) - inner(rub, rub) * inverse * time * scalar(0.5);
+    pair.force = minus(grown(normal, load), rub);
     return true;
 };
+
+// What the friction of a feature remembers: for each of its grips the partner, -1 for none, and
+// whether it was needed in the present kick.
+auto find_grip = [](int* partners, int g, bool keeps, bool& fresh) -> int {
+    int free = -1;
+    for (int e = 0; e < GRIPS; ++e) {
+        if (partners[e] == g) { fresh = false; if (keeps) partners[GRIPS + e] = 1; return e; }
+        if (free < 0 && partners[e] < 0) free = e;
+    }
+    fresh = true;
+    if (!keeps) return -1;
+    if (free >= 0) { partners[free] = g; partners[GRIPS + free] = 1; }
+    return free;
+};
+auto let_go = [](int* partners) {
+    for (int e = 0; e < GRIPS; ++e) {
+        if (!partners[GRIPS + e]) partners[e] = -1;
+        partners[GRIPS + e] = 0;
+    }
+};
 """
+)

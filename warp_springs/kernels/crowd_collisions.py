@@ -158,10 +158,11 @@ auto remember = [=](const scalar* where, int base, int robot, int slot) {
 };
 
 // What the temporary springs of a feature do to its own masses.
-auto push_feature = [=](int f, const scalar* where, int base, scalar time, bool rubs) {
+auto push_feature = [=](int f, const scalar* where, int base, scalar time, bool rubs, bool keeps) {
     const int count = state.partner_counts.data[f];
+    int* const partners = state.grip_partners.data + 2 * GRIPS * (long long)f;
     state.touched.data[f] = 0;
-    if (count == 0) return;
+    if (count == 0) { if (keeps) let_go(partners); return; }
     const int* const row = feature_row(f);
     const int first = model.robots.data[row[0] * ROBOT_COLUMNS];
     scalar force[9] = {}, energy = 0, rub = 0, soft = 0;
@@ -187,7 +188,12 @@ auto push_feature = [=](int f, const scalar* where, int base, scalar time, bool 
         };
         Push pair;
         const scalar* const contact = model.contacts.data + 6 * row[0];
-        if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, pair)) return;
+        auto grip_of = [&](bool& fresh) -> scalar* {
+            const int e = find_grip(partners, g, keeps, fresh);
+            return e < 0 ? nullptr : state.grips.data + GRIP * (GRIPS * (long long)f + e);
+        };
+        if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, grip_of, keeps, pair))
+            return;
         touched = true;
         energy += pair.energy * scalar(0.5);  // half of it belongs to the other side
         rub += pair.rub * scalar(0.5);
@@ -203,6 +209,7 @@ auto push_feature = [=](int f, const scalar* where, int base, scalar time, bool 
         const int* const list = state.partners.data + (long long)ROOM * f;
         for (int e = 0; e < count; ++e) meet_one(list[e]);
     } else each_near(f, meet_one);
+    if (keeps) let_go(partners);
     if (!touched) return;
     state.touched.data[f] = 1;
     scalar* const out = state.feature_forces.data + 12 * (long long)f;
@@ -248,7 +255,7 @@ auto touch_energy = [=](Slot at) -> real {
 
 #: What finds the temporary springs before a kick, where each pass is a launch: in order, by name,
 #: what each is launched over and its text. Around it: `index`, the positions `where`, the `time`
-#: of the kick, whether it `rubs`, and who `takes_part`.
+#: of the kick, whether it `rubs` and `keeps` what friction remembers, and who `takes_part`.
 COLLISION_JOBS = {
     "watch": (
         "sites",
@@ -286,7 +293,7 @@ fit_tree(where, robot, about[0], member, team, meet);
         r"""
 const int robot = feature_row(index)[0];
 if (!takes_part(robot)) return;
-push_feature(index, where, model.robots.data[robot * ROBOT_COLUMNS], time, rubs);
+push_feature(index, where, model.robots.data[robot * ROBOT_COLUMNS], time, rubs, keeps);
 if (index == meeting_row(robot)[0]) state.stale.data[robot] = 0;
 """,
     ),

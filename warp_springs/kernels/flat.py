@@ -108,7 +108,7 @@ auto collide = [&](scalar time, bool rubs) {
         for (int f = from; f < to; ++f) list_near(f);
         if (leader) *state.stale.data = 0;
     }
-    for (int f = from; f < to; ++f) push_feature(f, now(), 0, time, rubs);
+    for (int f = from; f < to; ++f) push_feature(f, now(), 0, time, rubs, rubs);
     meet();
 };
 #else
@@ -334,7 +334,7 @@ const long long n = clock.data[0] + offset;
 const scalar* const where = state.positions.data + ((n + PASS) & 1) * (4 * (long long)slots);
 const scalar time = EULER ? dt : PASS ? GRADIENT_KICK
     : n == 0 ? FIRST_KICK : FIRST_KICK * scalar(2);
-const bool rubs = PASS != 1;
+const bool rubs = PASS != 1, keeps = rubs;
 const int index = slot;
 auto takes_part = [=](int robot) -> bool { return state.states.data[robot] == 0; };
 """

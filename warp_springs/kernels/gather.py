@@ -147,6 +147,8 @@ STATE = {
     "partner_counts": np.int32,
     "fitted_positions": REAL,  # quads, where the trees were fitted
     "stale": np.int32,  # whether the tree of each robot must be fitted anew
+    "grip_partners": np.int32,  # see kernels.contact
+    "grips": REAL,
     "touched": np.int32,  # whether each feature touches another
     "feature_forces": REAL,  # forces on its masses [3][3], energy, power of its two losses
     "states": np.int32,  # Status

@@ -47,7 +47,7 @@ keep_quad(shown.data, at, a, w);
 _COLLIDE = r"""
 const scalar* const where = shown.data;
 const scalar time = FIRST_KICK;
-const bool rubs = step > 0;
+const bool rubs = step > 0, keeps = false;
 auto takes_part = [=](int robot) -> bool { return wanted.data[robot] != 0; };
 """
 
