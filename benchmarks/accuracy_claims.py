@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from accuracy_bodies import G, breathing_lattice, plate
 from accuracy_measure import Row, cost_of, step_name
 from accuracy_peer import Comparison
-from accuracy_scenes import CASES, G, breathing_lattice, plate
+from accuracy_scenes import CASES
 
 import warp_springs as ws
 

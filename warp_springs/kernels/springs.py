@@ -1,10 +1,52 @@
-"""Springs with more to them than k and L0: the law of one, and how the lanes keep them."""
+"""Springs: their pull and energy, what they may have beyond k and L0, how the lanes keep them."""
 
 __all__ = ["KEEPING", "SPRINGS", "WEAR"]
 
-# The law of one spring, for every layout. The numbers of a spring, c, follow each other: those of a
-# plain one, then slope, k3 / k, stretch and part of each hinge, and so on.
+# The law of one spring, for every layout.
 SPRINGS = r"""
+// A spring of stiffness k and rest length L0 pulls its first mass with k (L - L0) d / L
+// = (k - 2 h / L) d, where h = k L0 / 2. TINY keeps 1 / L finite where two masses coincide;
+// d = 0 then makes the force zero.
+auto squared_length = [=](real x, real y, real z) __attribute__((always_inline)) -> real {
+    return x * x + (y * y + (z * z + TINY));
+};
+auto spring_pull = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
+    return less_over_root(k, h, length2);
+};
+// The same for a spring of stiffness k and rest length L0 to a point, d away.
+auto tether_force = [=](Vec d, real k, real L0) __attribute__((always_inline)) -> Vec {
+    return scaled(d, spring_pull(dot(d, d) + TINY, k, k * L0 * scalar(0.5)));
+};
+// The part of the present kick's time in which what lasts from start to end acts: so its impulse is
+// exact.
+auto acting_part = [&](double start, double end) -> scalar {
+    const double from = start > kick_begin ? start : kick_begin;
+    const double to = end < kick_end ? end : kick_end;
+    return scalar(to > from ? (to - from) / (kick_end - kick_begin) : 0);
+};
+auto spring_energy = [=](real length2, real k, real h) __attribute__((always_inline)) -> real {
+    real stretch_force = k * square_root(length2) - h * scalar(2);
+    return stretch_force * stretch_force / k * scalar(0.5);
+};
+
+// Power that a breathing spring puts in: -(tension) L0'(t), with L0' = 2 h' / k.
+auto breathing_power = [=](real length2, real k, real h, real h_rate)
+        __attribute__((always_inline)) -> real {
+    return (h * scalar(2) - k * square_root(length2)) * (h_rate * scalar(2)) / k;
+};
+
+// h(t) = k / 2 (a + b sin(wt + c)) = ha + hs sin(wt) + hc cos(wt)
+auto breathing = [=](real ha, real hs, real hc, real sine, real cosine)
+        __attribute__((always_inline)) -> real {
+    return (ha + hs * sine) + hc * cosine;
+};
+auto breathing_rate = [=](real hs, real hc, real sine, real cosine, real omega)
+        __attribute__((always_inline)) -> real {
+    return (hs * cosine - hc * sine) * omega;
+};
+
+// Springs beyond Hooke. The numbers of one, c, follow each other: those of a plain spring, then
+// slope, k3 / k, stretch and part of each hinge, and so on.
 const bool SPECIAL = HARMONICS || OWN_OMEGAS || CURVED || DASHPOTS || LIMITS || TIMETABLE;
 const int AT_HARMONICS = ACTUATED ? 4 : 2, AT_CURVE = AT_HARMONICS + 2 * HARMONICS;
 const int AT_DASHPOT = AT_CURVE + (CURVED ? 2 + 2 * HINGES : 0);

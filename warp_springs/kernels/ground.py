@@ -1,0 +1,113 @@
+"""The ground: its force, friction, and how a mass moves that touches it.
+
+Other surfaces stand in ``obstacles``; their touch is the same flow and the same friction.
+"""
+
+__all__ = ["GROUND"]
+
+GROUND = r"""
+// Force of an elastic surface of stiffness k on a mass at height z over it.
+auto surface_force = [=](real z, real k) __attribute__((always_inline)) -> real {
+    return select(z < zero, z * -k, zero);
+};
+// Upward force of the ground on a mass at height z.
+auto ground_force = [=](real z, const Own& own) __attribute__((always_inline)) -> real {
+    return surface_force(z, contact_stiffness(own, ground_stiffness));
+};
+
+// Coulomb's law for one step: a normal impulse `hold` (per unit of mass) stops a tangential
+// velocity up to mu_s hold, and an impulse j shortens a larger one by mu_k j along its direction.
+// What is left of it, as a factor:
+auto coulomb = [=](real speed, real hold, real j, real mu_s, real mu_k)
+        __attribute__((always_inline)) -> real {
+    real left = scalar(1) - mu_k * j / select(speed > zero, speed, zero + scalar(1));
+    left = select(left > zero, left, zero);
+    return select((hold > zero) & (speed <= mu_s * hold), zero, left);
+};
+
+// The classroom's rule: the horizontal FORCE f against the normal force n. Below mu_s n both the
+// force and the velocity vanish, above it the force is reduced by mu_k n.
+auto course_friction = [=](real& fx, real& fy, real& ux, real& uy, real n, const Own& own)
+        __attribute__((always_inline)) {
+    mask touching = n > zero;
+    if (!any(touching)) return;
+    real f = square_root(fx * fx + fy * fy);
+    mask stuck = touching & (f < static_friction_of(own, static_friction) * n);
+    real left = scalar(1) - kinetic_friction_of(own, kinetic_friction) * n
+        / select(f > zero, f, zero + scalar(1));
+    left = select(left > zero, left, zero);
+    real factor = select(stuck, zero, select(touching, left, zero + scalar(1)));
+    fx *= factor; fy *= factor;
+    ux = select(stuck, zero, ux); uy = select(stuck, zero, uy);
+};
+auto rub = [=](Sum& v, real hold, real impulse, const Own& own, Losses& losses, scalar kinetic)
+        __attribute__((always_inline)) {
+    if (!COULOMB || !any(hold > zero)) return;
+    const Vec before = v;
+    const real factor = coulomb(square_root(v.x * v.x + v.y * v.y), hold, impulse,
+                                static_friction_of(own, static_friction),
+                                kinetic_friction_of(own, kinetic));
+    v.x *= factor; v.y *= factor;
+    settle_rest(v);
+    if (LEDGER) losses.friction = losses.friction + (before - v);
+};
+
+// Height z over a surface of stiffness k and velocity u along its normal, under gravity g along it
+// and the surface's force, over one drift by `substeps` velocity-Verlet steps; returns the impulse
+// of the surface per unit of mass. The kicks that meet between two steps are one: each step waits
+// for the one before, so a step has few operations.
+auto contact_flow = [=](real& z, real& u, real k, real w, real g, int substeps)
+        __attribute__((always_inline)) -> real {
+    const scalar h = span / scalar(substeps), half = scalar(0.5);
+    const real fall = g * h, strength = w * (k * h);
+    real push = surface_force(z, strength), impulse = push * half;
+    u += (push + fall) * half;
+    for (int s = 0; s < substeps; ++s) {
+        z += u * h;
+        push = surface_force(z, strength);
+        u = (u + fall) + push;
+        impulse += push;
+    }
+    u -= (push + fall) * half;
+    return impulse - push * half;
+};
+// The part of an impulse that may hold a mass in this drift; see touch_down.
+auto share_hold = [=](real& hold, real impulse, real& left_over, bool last)
+        __attribute__((always_inline)) {
+    hold = last ? impulse + left_over : impulse * (scalar(2) / scalar(3));
+    left_over = impulse - hold;
+    hold = select(impulse > zero, hold, zero);
+};
+
+// A mass in free flight follows its parabola; where the parabola's ends are not both above the
+// ground, the contact flow takes over. Friction acts once a drift, between the kick and the drift,
+// so that a mass that sticks does not move at all. What slides is slowed by the drift's own
+// impulse. What sticks is held in proportion to the kick before the drift: the first drift of a
+// chin4 step, after a third of the step's kicks, leaves a third of its hold to the second.
+auto touch_down = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
+                      const Own& own, Losses& losses) __attribute__((always_inline)) {
+    const real height = in_world(x).z, u = v.z;
+    const real mean = u + gravity_z * span * scalar(0.5), z = height + mean * span;
+    add_upright(v, zero + gravity_z, span);
+    const mask touching = (height < zero) | (z < zero);
+    if (any(touching)) {
+        real z_contact = height, u_contact = u;
+        real impulse = contact_flow(z_contact, u_contact, contact_stiffness(own, ground_stiffness),
+                                    w, zero + gravity_z, substeps);
+        v.z = select(touching, u_contact, v.z);
+#if MIXED
+        v.low.z = select(touching, zero, v.low.z);
+        grow(x.z, x.low.z, select(touching, z_contact - height, mean * span));
+#else
+        x.z = select(touching, z_contact, z);
+#endif
+        impulse = select(touching, impulse, zero);
+        real hold = impulse;
+        if (CHIN4) share_hold(hold, impulse, left_over, last);
+        rub(v, hold, impulse, own, losses, kinetic_friction);
+    } else {
+        if (CHIN4) left_over = zero;
+        add_upright(x, mean, span);
+    }
+};
+"""
