@@ -74,8 +74,8 @@ def energies(robot, scene, positions, velocities, time):
 class Trial:
     """One robot stepped by the simulator's discrete algorithm.
 
-    `contact_substeps` is the number of velocity-Verlet sub-steps of the vertical motion that a
-    mass near the ground takes within a drift; `euler` has no drift and ignores it.
+    `contact_substeps` is the number of sub-steps of the vertical motion that a mass near the
+    ground takes within a drift; `euler` has no drift and ignores it.
 
     `margin` is the smallest relative distance of any stick-or-slip decision from its threshold.
     The outcome of friction jumps there: where the margin is of the order of rounding, two correct
@@ -87,6 +87,7 @@ class Trial:
         self.scene = scene
         self.dt = dt
         self.contact_substeps = contact_substeps
+        self._takes_back = integrator == "chin4"
         self.positions = np.array(robot.positions, dtype=np.float64)
         self.masses = np.asarray(robot.masses, dtype=np.float64)
         self.gravity = np.asarray(scene.gravity, dtype=np.float64)
@@ -213,24 +214,25 @@ class Trial:
     # one that begins the next are one.
 
     def _leapfrog(self):
-        begins = self.steps == 0
-        self._lossy_kick(self._spring_forces(), self.dt / 2 if begins else self.dt, begins)
-        impulse = self._fall()
+        begins, forces = self.steps == 0, self._spring_forces()
+        self._lossy_kick(forces, self.dt / 2 if begins else self.dt, begins)
+        impulse = self._fall(self._with_weight(forces), ahead=self.dt / 2)
         self._slide(impulse, impulse)
 
     def _chin4(self):
         """Chin's 4A: the middle kick takes the forces a little further along the acceleration."""
-        dt, begins = self.dt, self.steps == 0
-        self._lossy_kick(self._spring_forces(), dt / 6 if begins else dt / 3, begins)
-        first = self._fall()
+        dt, begins, forces = self.dt, self.steps == 0, self._spring_forces()
+        bow = dt**2 / 24
+        self._lossy_kick(forces, dt / 6 if begins else dt / 3, begins)
+        first = self._fall(self._with_weight(forces), ahead=dt / 6, after=bow)
         self._slide(first * 2 / 3, first)  # after a third of the step's kicks
 
         middle = self.time + dt / 2
         forces = spring_forces(self.robot, self.positions, middle)
-        shift = self._with_weight(forces) / self.masses[:, None] * dt**2 / 24
+        shift = self._with_weight(forces) / self.masses[:, None] * bow
         forces = spring_forces(self.robot, self.positions + shift, middle)
         self._lossy_kick(forces, dt * 2 / 3, begins=False)
-        second = self._fall()
+        second = self._fall(self._with_weight(forces), ahead=dt / 3, before=bow)
         self._slide(np.where(second > 0.0, first / 3 + second, 0.0), second)
 
     def _with_weight(self, forces):
@@ -266,37 +268,57 @@ class Trial:
             mean = np.where(slides, (mean + self._state[:, XY]) / 2, 0.0)
         self.positions[:, XY] += mean * self._span
 
-    def _fall(self):
-        """Vertical drift; returns the ground's impulse per mass [m/s], (M,)."""
+    def _fall(self, forces, ahead, before=0.0, after=0.0):
+        """Vertical drift; returns the ground's impulse per mass [m/s], (M,).
+
+        `forces` are those of the kick before it. Where a mass may touch down or leave, they act
+        during the drift instead: then it is at `before` [s^2] times their acceleration above its
+        place when the drift begins, at `after` times that when it ends, and its kicks are `ahead`
+        [s] of it.
+        """
         impulse = np.zeros(len(self.masses))
         if self.scene.ground is None:
             self.positions[:, Z] += self._state[:, Z] * self._span
             return impulse
         g, span = self.gravity[Z], self._span
         for i, mass in enumerate(self.masses):
-            z, w = self.positions[i, Z], self._state[i, Z]
+            z, w, a = self.positions[i, Z], self._state[i, Z], forces[i, Z] / mass
             free = z + w * span + g * span**2 / 2
-            if z < 0.0 or free < 0.0:
-                z, w, impulse[i] = self._contact(z, w, mass)
+            if z + a * before < 0.0 or free + a * after < 0.0:
+                start, going = z + a * before, w - a * ahead
+                if not self._takes_back or self._stays(start, going, g + a, mass):
+                    start, going, a = z, w, 0.0
+                z, w, impulse[i] = self._contact(start, going, g + a, mass)
+                z, w = z - a * after, w + a * (ahead - span)
             else:
                 z, w = free, w + g * span
             self.positions[i, Z], self._state[i, Z] = z, w
         return impulse
 
-    def _contact(self, z, w, mass):
-        """Velocity-Verlet sub-steps of one mass under gravity and ground: z, w, impulse."""
-        g, h = self.gravity[Z], self._span / self.contact_substeps
-        push = self.scene.ground.stiffness / mass
-        impulse = 0.0
+    def _stays(self, z, w, g, mass):
+        """Whether a mass under g [m/s^2] is in contact and surely stays so for a drift."""
+        push = self.scene.ground.stiffness / mass * max(-z, 0.0)
+        return z < 0.0 and z + w * self._span + (push + g) * self._span**2 / 2 < 0.0
+
+    def _contact(self, z, w, g, mass):
+        """Sub-steps of one mass under the ground and g [m/s^2]: z, w, impulse.
+
+        Kick-drift-kick, while it is held with the lengths that make an oscillation exact, as
+        series; half a spring's force where the contact begins or ends inside a sub-step.
+        """
+        h, push = self._span / self.contact_substeps, self.scene.ground.stiffness / mass
+        q = push * h**2 if push * h**2 < 1.0 else 0.0
+        kicks = {True: h / 2 * (1 + q / 12 + q**2 / 120), False: h / 2}
+        ways = {True: h * (1 - q / 6 + q**2 / 120), False: h}
+        start = w
         for _ in range(self.contact_substeps):
-            up = push * max(-z, 0.0)
-            w += (g + up) * h / 2
-            z += w * h
-            impulse += up * h / 2
-            up = push * max(-z, 0.0)
-            w += (g + up) * h / 2
-            impulse += up * h / 2
-        return z, w, impulse
+            before, held = z, z < 0.0
+            w += (g + push * max(-z, 0.0)) * kicks[held]
+            z += w * ways[held]
+            w += (g + push * max(-z, 0.0)) * kicks[z < 0.0]
+            if held != (z < 0.0):
+                w -= push * h / 2 * abs(z * before) / (abs(z) + abs(before))
+        return z, w, w - start - g * self._span
 
 
 def continuum(robot, scene, duration, steps):

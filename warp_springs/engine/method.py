@@ -21,7 +21,7 @@ LEVELS = 12
 #: fastest vibrations are bounded, but wrong.
 AUTO_PART = 0.5
 #: Steps of the contact flow within one drift: no fewer, no more, if the caller does not choose.
-SUBSTEPS = (16, 1024)
+SUBSTEPS = (8, 1024)
 #: Largest phase of a contact oscillation in a sub-step, beyond which bounces gain energy (measured:
 #: three times in 20 s at 0.94, seven thousand times at 1.9). At 2 the sub-step itself is unstable:
 #: the limit where the caller chooses their number, and for "euler", which has none.
@@ -68,13 +68,13 @@ class Method:
         """Contact sub-steps in a drift of each robot, shape (n,).
 
         A power of two, within ``SUBSTEPS``, that keeps the phase of the fastest contact
-        oscillation, sqrt(K_G / m) times a drift, below a sixteenth of a radian a sub-step.
+        oscillation, sqrt(K_G / m) times a drift, below an eighth of a radian a sub-step.
         """
         if not scene.stiffest_surface or self.integrator == "euler":
             return np.ones(len(strip.ids), np.int64)
         if self.contact_substeps is not None:
             return np.full(len(strip.ids), self.contact_substeps, np.int64)
-        wanted = np.clip(16.0 * self._contact_phase(strip, scene, levels), *SUBSTEPS)
+        wanted = np.clip(8.0 * self._contact_phase(strip, scene, levels), *SUBSTEPS)
         return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
 
     def _contact_phase(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:

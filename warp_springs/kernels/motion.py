@@ -62,11 +62,12 @@ auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inlin
     if (LEDGER) losses.damping = losses.damping + (before - v);
 };
 // The classroom's friction belongs to the kick, since it works on the force. The force f was taken
-// at `at`, which is x but for the gradient kick.
+// at `at`, which is x but for the gradient kick. Returns the acceleration without friction.
 auto kick = [=](Sum& v, Vec f, Vec at, Vec x, real w, scalar time, const Own& own, Losses& losses)
-        __attribute__((always_inline)) {
+        __attribute__((always_inline)) -> Vec {
     Vec a = kick_acceleration(f, at, w, own);
     if (BOUND) a = tangent(a, x, own);
+    const Vec whole = a;
     Sum free = v;
     if (GROUND && COURSE) {
         if (LEDGER) add(free, a, time);
@@ -76,6 +77,7 @@ auto kick = [=](Sum& v, Vec f, Vec at, Vec x, real w, scalar time, const Own& ow
     add(v, a, time);
     if (LEDGER && OUTER) losses.outer = losses.outer - scaled(own.outer, w * time);
     if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
+    return whole;
 };
 auto lose_before = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
@@ -90,11 +92,11 @@ auto lose_after = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
 
 // Friction slows a sliding mass evenly during the drift, which therefore moves it with the mean of
 // the velocities before and after: second order.
-auto drift = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool last,
+auto drift = [=](Sum& x, Sum& v, Vec a, real w, int substeps, real& left_over, bool last,
                  const Own& own, Losses& losses) __attribute__((always_inline)) {
     const Vec x0 = x, v0 = v;
     Vec mean = v;
-    if (GROUND) touch_down(x, v, w, substeps, left_over, last, own, losses);
+    if (GROUND) touch_down(x, v, w, substeps, left_over, last, a.z, own, losses);
     else add_upright(x, v.z, span);
     if (COULOMB) {
         const mask slides = (v.x != zero) | (v.y != zero);
@@ -102,7 +104,7 @@ auto drift = [=](Sum& x, Sum& v, real w, int substeps, real& left_over, bool las
         mean.y = select(slides, (mean.y + v.y) * scalar(0.5), zero);
     }
     add_level(x, mean, span);
-    if (OBSTACLES) meet_obstacles(x, v, x0, w, substeps, last, own, losses);
+    if (OBSTACLES) meet_obstacles(x, v, x0, a, w, substeps, last, own, losses);
     if (BOUND) bind(x, v, x0, v0, own);
 };
 // The velocity at t_n, from the state before its kicks: what the last part of them adds. The state
@@ -153,10 +155,10 @@ auto move_mass = [=](Sum& x, Sum& v, Vec f, Vec at, real w, int substeps, real& 
     const Vec before = v, here = in_world(x);
     Losses losses = {}, rubbed = {};
     if (!start) lose_before(v, here, w, own, losses);
-    kick(v, f, at, here, w, time, own, losses);
+    const Vec a = kick(v, f, at, here, w, time, own, losses);
     lose_after(v, here, w, own, losses);
     const Vec kicked = v;
-    drift(x, v, w, substeps, left_over, last, own, rubbed);
+    drift(x, v, a, w, substeps, left_over, last, own, rubbed);
     enter_step(ledger, losses, rubbed, before, kicked, v, w);
 };
 auto move_mass_euler = [=](Sum& x, Sum& v, Vec f, real w, real* ledger, const Own& own)

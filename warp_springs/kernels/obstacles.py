@@ -143,26 +143,22 @@ auto rub_surface = [=](Vec u, real hold, real impulse, const Own& own, const dou
     return scaled(u, factor);
 };
 
-// A mass that its drift took from `from` to x is stopped and turned by the obstacles it meets.
-// Its kicks are ahead of its drifts, or behind, by `ahead` seconds when a drift begins; along the
-// normal that is undone while gravity and the surface act together, so that a mass at rest stays
-// at rest. `bow` dt^2 is what the stages of a step deviate from a parabola for the same reason.
-auto meet_obstacles = [=](Vec& x, Vec& v, Vec from, real w, int substeps, bool last,
+// A mass that its drift took from `from` to x, after a kick by the acceleration a, is stopped and
+// turned by the obstacles it meets. Gravity, a kick here, acts together with their forces, so that
+// a mass at rest stays at rest.
+auto meet_obstacles = [=](Vec& x, Vec& v, Vec from, Vec a, real w, int substeps, bool last,
                           const Own& own, Losses& losses) {
-    const scalar ahead = CHIN4 ? (last ? dt / scalar(3) : dt / scalar(6)) : dt * scalar(0.5);
-    const scalar bow = CHIN4 ? dt * dt / scalar(24) : scalar(0);
     const Vec gravity = {zero + gravity_x, zero + gravity_y, zero + gravity_z};
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
         const Touch end = touch(o, x);
         const mask touching = (end.gap < zero) | (touch(o, from).gap < zero);
         if (!any(touching)) { if (CHIN4) own.left_over[k] = zero; continue; }
-        const real g = dot(gravity, end.n), speed = dot(v, end.n);
-        real z = end.gap - dot(end.n, x - from), u = speed - g * ahead;
-        if (last) z += g * bow;
-        real impulse = contact_flow(z, u, contact_stiffness(own, scalar(o[1])), w, g, substeps);
-        if (CHIN4 && !last) z -= g * bow;
-        u += g * (ahead - span);
+        const real speed = dot(v, end.n), stiffness = contact_stiffness(own, scalar(o[1]));
+        real z = end.gap - dot(end.n, x - from), u = speed;
+        const real back = taken_back(z, u, stiffness, w, zero, dot(a, end.n),
+                                     dot(gravity, end.n), last);
+        real impulse = contact_flow(z, u, stiffness, w, zero, back, substeps, last);
         impulse = select(touching, impulse, zero);
         const Vec along = v - scaled(end.n, speed);
         real hold = impulse;
