@@ -87,7 +87,7 @@ def draw(
 def _panel(ax: Axes, rows: Sequence[Row], case: Case, truth: Truth, cost: str) -> None:
     ax.set_title(case.title, fontsize=11, loc="left", fontweight="bold")
     ax.set(xscale="log", yscale="log", ylim=SHOWN)
-    ax.margins(x=0.1)
+    ax.margins(x=0.14)
     ax.set_yticks([1e-10, 1e-8, 1e-6, 1e-4, 1e-2])
     ax.grid(which="major", color="#e6e8eb", linewidth=0.8)
     ax.set_axisbelow(True)

@@ -53,6 +53,14 @@ def test_solver_agrees_with_runge_kutta_across_a_bounce():
     assert np.abs(found.velocities - velocities).max() < 2e-3
 
 
+def test_chin4_keeps_its_order_where_a_lattice_lands():
+    case = dataclasses.replace(CASES["lattice"], judged=3)
+    truth = case.truth()
+    for dt, largest in ((1e-3, 4e-5), (5e-4, 3e-6), (1e-4, 2e-8)):
+        result = ws.Simulation(case.batch(3), case.scene, dt).run(case.duration)
+        assert np.median(case.errors(result, truth)) < largest
+
+
 def test_solver_keeps_the_energy_of_a_lossless_bounce():
     case = CASES["bouncing cube"]
     robot, scene = case.robot, case.scene

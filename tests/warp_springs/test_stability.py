@@ -158,6 +158,16 @@ def test_masses_too_light_for_the_contact_flow_do_not_gain_energy_unnoticed(inte
     assert np.all(kept | (result.status != ws.Status.OK))
 
 
+def test_what_vibrates_on_the_ground_neither_heats_up_nor_cools_down():
+    cube = ws.shapes.cube().moved((0.0, 0.0, -2e-5))
+    down = np.where(cube.positions[:, 2:] > 0.05, -0.02, 0.0)
+    cube = cube.replace(velocities=down * np.array([0.0, 0.0, 1.0]))
+    energy = ws.Simulation(cube, ICE, 1e-3).run(600.0, fps=1, energy=True).energy
+    vibration = energy.kinetic[0, 0]
+    assert abs(energy.total[0, -60:].mean() - energy.total[0, 0]) < 0.1 * vibration
+    assert energy.ground[0].min() > 0.0  # it never left the ground
+
+
 def test_variants_and_sequences_have_the_same_bound():
     body = shapes()["2 x 1 x 1"]
     stiffness = np.random.default_rng(0).uniform(100.0, 1e5, (9, body.n_springs))
@@ -293,7 +303,7 @@ def absurd_robots(draw):
     springs = draw(st.lists(indices.filter(lambda s: s[0] != s[1]), max_size=12 * (masses > 1)))
     scale, n = draw(decades(-12, 12)), len(springs)
     point = st.tuples(*[st.sampled_from([0.0, 1.0, -1.0, 0.3])] * 3)
-    return ws.Robot(
+    robot = ws.Robot(
         masses=draw(st.lists(decades(-9, 6), min_size=masses, max_size=masses)),
         positions=scale * np.array([draw(point) for _ in range(masses)]),
         velocities=draw(decades(-300, 300)) * np.array([draw(point) for _ in range(masses)]),
@@ -303,22 +313,24 @@ def absurd_robots(draw):
         amplitude=draw(st.one_of(st.just(0.0), decades(-6, 6))),
         omega=draw(decades(-3, 6)),
     )
+    return robot.with_cables() if n and draw(st.booleans()) else robot
 
 
 @functools.cache
-def neighbours():
+def neighbours(layout):
     robots = [ws.shapes.cube(), pair(100.0, velocities=[(0, 0, 0), (0.1, 0.2, 0.3)])]
-    result = ws.Simulation(robots, GROUND, DT).run(0.2)
+    result = ws.Simulation(robots, GROUND, DT, layout=layout).run(0.1)
     return robots, [bits(result, i) for i in range(len(robots))]
 
 
-@settings(max_examples=40)
+@pytest.mark.parametrize("layout", ["lanes", "flat", "block"])
+@settings(max_examples=25)
 @given(st.lists(absurd_robots(), min_size=1, max_size=4))
-def test_garbage_ends_in_a_status_or_finite_and_disturbs_nobody(garbage):
-    robots, expected = neighbours()
+def test_garbage_ends_in_a_status_or_finite_and_disturbs_nobody(layout, garbage):
+    robots, expected = neighbours(layout)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        result = ws.Simulation([*garbage, *robots], GROUND, DT).run(0.2)
+        result = ws.Simulation([*garbage, *robots], GROUND, DT, layout=layout).run(0.1)
     for i, status in enumerate(result.status[: len(garbage)]):
         assert status in set(ws.Status)
         assert np.isfinite(result.positions(i)).all()
