@@ -315,7 +315,7 @@ class Trial:
             before, held = z, z < 0.0
             w += (g + push * max(-z, 0.0)) * kicks[held]
             z += w * ways[held]
-            w += (g + push * max(-z, 0.0)) * kicks[z < 0.0]
+            w += (g + push * max(-z, 0.0)) * kicks[held]
             if held != (z < 0.0):
                 w -= push * h / 2 * abs(z * before) / (abs(z) + abs(before))
         return z, w, w - start - g * self._span
