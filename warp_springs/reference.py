@@ -318,7 +318,7 @@ class Trial:
             w += (g + push * max(-z, 0.0)) * kicks[held]
             if held != (z < 0.0):
                 w -= push * h / 2 * abs(z * before) / (abs(z) + abs(before))
-        return z, w, w - start - g * self._span
+        return z, w, max(w - start - g * self._span, 0.0)
 
 
 def continuum(robot, scene, duration, steps):

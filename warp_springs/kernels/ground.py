@@ -72,7 +72,7 @@ auto taken_back = [=](real z, real u, real k, real w, real g, real a, real alway
     if (!CHIN4) return always;
     z += a * bow_before(last);
     u -= a * ahead_of(last);
-    const real rise = u + (surface_force(z, w * k) + g + a) * (span * scalar(0.5));
+    const real rise = u + (surface_force(z, w * k) + (g + a)) * (span * scalar(0.5));
     return select((z < zero) & (z + rise * span < zero), always, a);
 };
 // Height z over a surface of stiffness k and velocity u along its normal, under the surface's force
@@ -82,7 +82,9 @@ auto taken_back = [=](real z, real u, real k, real w, real g, real a, real alway
 // The steps are kick-drift-kick, of lengths with which an oscillation comes out exactly (tan and
 // sin of its phase, as series) while the mass is held, and plain ones while it is free. The step in
 // which it changes between the two gets the impulse of a force that begins or ends inside it. The
-// kicks that meet between two steps are one.
+// kicks that meet between two steps are one. The impulse is added up, exactly zero where nothing
+// touches; what longer kicks give of the other forces counts as the surface's. A surface does not
+// hold back: rounding must not make friction push.
 auto contact_flow = [=](real& z, real& u, real k, real w, real g, real a, int substeps, bool last)
         __attribute__((always_inline)) -> real {
     const scalar h = span / scalar(substeps), half = scalar(0.5), ahead = ahead_of(last);
@@ -93,30 +95,32 @@ auto contact_flow = [=](real& z, real& u, real k, real w, real g, real a, int su
     const real held_reach = (q * (q - scalar(20)) * scalar(1.0 / 120) + scalar(1)) * h;
     z += a * bow_before(last);
     u -= a * ahead;
-    const real start = u;
     mask held = z < zero;
-    real time = select(held, held_kick, free_kick), force = surface_force(z, strength) + all;
-    u += force * time;
+    real time = select(held, held_kick, free_kick);
+    real push = surface_force(z, strength), impulse = push * time;
+    u += all * time + impulse;
+    impulse += all * (time - free_kick);
     for (int s = 0; s < substeps; ++s) {
         const real before = z;
         z += u * select(held, held_reach, free_reach);
-        force = surface_force(z, strength) + all;
-        const mask holds = z < zero;
-        const real next = select(holds, held_kick, free_kick);
-        u += force * (time + next);
-        time = next;
-        const mask crosses = holds != held;
-        held = holds;
+        push = surface_force(z, strength);
+        const mask holds = z < zero, crosses = holds != held;
+        const real next = select(holds, held_kick, free_kick), both = time + next;
+        time = next; held = holds;
+        u += all * both;
+        real given = push * both;
         if (any(crosses)) {
             const real excess = strength * (h * half) * z * before / (z - before);
-            u -= select(crosses, select(z < before, excess, -excess), zero);
+            given -= select(crosses, select(z < before, excess, -excess), zero);
         }
+        u += given;
+        impulse += given + all * (both - free_reach);
     }
-    u -= force * time;
-    const real impulse = u - start - all * span;
+    u -= (push + all) * time;
+    impulse -= push * time + all * (time - free_kick);
     z -= a * bow_after(last);
     u += a * (ahead - span);
-    return impulse;
+    return select(impulse > zero, impulse, zero);
 };
 // The part of an impulse that may hold a mass in this drift; see touch_down.
 auto share_hold = [=](real& hold, real impulse, real& left_over, bool last)
