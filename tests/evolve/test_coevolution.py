@@ -48,7 +48,9 @@ def test_a_meeting_is_judged_on_its_own_hills(config):
     assert one.fitness[0] == scores.fitness[row]
     look = looked_at_again(evaluator, encoding, genomes[[row, 2]], scores.fitness[[row, 2]])
     assert np.isfinite(look.halved).all()
-    assert look.halved_kept[0] == look.halved[0] / scores.fitness[row]
+    there = evaluator.within(alone[1])
+    same = there.second_look(encoding.express(genomes[row : row + 1]), one.fitness)
+    assert look.halved[0] == same.halved[0] and look.perturbed[0] == same.perturbed[0]
 
 
 def test_robots_are_worth_their_mean_and_hills_what_robots_lack(config):
