@@ -41,7 +41,7 @@ CREATE TABLE parent (
 CREATE TABLE descriptor (individual INTEGER PRIMARY KEY REFERENCES individual (id){columns});
 CREATE TABLE second_look (
     individual INTEGER PRIMARY KEY REFERENCES individual (id),
-    dt REAL NOT NULL,                     -- half the first step [s]
+    dt REAL NOT NULL,                     -- half the first step, or the stable one [s]
     halved REAL,                          -- fitness at this step in float64
     halved_kept REAL,                     -- that / first fitness
     perturbed REAL,                       -- quantile of the fitness from perturbed starts

@@ -65,7 +65,7 @@ class Finalist:
     generation: int
     fitness: float
     dt: float
-    """Half the step that it took at first [s]."""
+    """Half the step that it took at first, or less where that was not stable [s]."""
     halved: float
     """Fitness at that step in float64; NaN = none."""
     halved_kept: float

@@ -59,8 +59,8 @@ class Simulation:
             results agree to rounding. ``"auto"`` chooses for each robot: on a CPU ``"lanes"``
             (many robots at once, one in each SIMD lane), for a large body ``"flat"`` (its masses
             shared by all threads); on a GPU ``"block"`` (whole robots in a block of threads, up to
-            384 masses, 512 in float32), for a larger body ``"flat"``. A CPU runs ``"block"`` too,
-            slowly, to verify.
+            320 masses, 384 in mixed precision, 512 in float32), for a larger body ``"flat"``. A CPU
+            runs ``"block"`` too, slowly, to verify.
 
     Raises:
         ValueError: An argument is out of range, there is no robot, the machine has no such device,

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Evaluator"]
 
+MOST_HALVINGS = 4
+"""Of the step of a second look, beyond the first."""
+
 Place = tuple[float, float, float]
 
 MARK = 0.06
@@ -125,15 +128,16 @@ class Evaluator:
     def second_look(self, robots: Sequence[ws.Robot], fitness: np.ndarray) -> SecondLook:
         """Repeat the trial at half the time step in float64, and from perturbed starts.
 
-        Each robot takes half its own step; robots of the same step run in one simulation. The
-        perturbed trials of all robots run in another, as the first trial ran but for the starts.
+        Each robot takes half its own step, or half its longest stable one if that is less; robots
+        of the same step run in one simulation. The perturbed trials of all robots run in another,
+        as the first trial ran but for the starts.
 
         Args:
             robots: n robots.
             fitness: Their fitness at the first look, shape (n,).
         """
         settings = self.task.second_look
-        dt = 0.5 * self._simulate(robots).robot_dt
+        dt = self._doubtless_steps(robots)
         halved = np.full(len(robots), np.nan)
         for step in np.unique(dt):
             alike = np.flatnonzero(dt == step)
@@ -151,6 +155,20 @@ class Evaluator:
         kept = share(halved, fitness), share(usual, fitness)
         survives = (kept[0] >= settings.threshold) & (kept[1] >= settings.threshold)
         return SecondLook(dt, halved, kept[0], usual, kept[1], survives)
+
+    def _doubtless_steps(self, robots: Sequence[ws.Robot]) -> np.ndarray:
+        """Half the step of each robot, or of its longest stable one if that is less, (N,) [s].
+
+        Half of a step that is too long may be too long as well, and agree with it. Halved as often
+        as needed, so that few different steps occur.
+        """
+        import warp_springs as ws
+
+        first = self._simulate(robots).robot_dt
+        integrator = self.simulation.integrator
+        stable = np.array([ws.stable_dt(robot, self.scene, integrator) for robot in robots])
+        excess = np.ceil(np.log2(np.maximum(first / np.maximum(stable, 1e-300), 1.0)))
+        return 0.5 * first * 0.5 ** np.minimum(excess, MOST_HALVINGS)
 
     def film(
         self,

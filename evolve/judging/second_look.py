@@ -20,7 +20,8 @@ class SecondLook:
     """What is left of the fitness of n robots."""
 
     dt: np.ndarray
-    """Half the step that each robot took at first [s], shape (n,)."""
+    """Half the step that each robot took at first, or less where that was not stable [s], shape
+    (n,)."""
     halved: np.ndarray
     """Fitness at that step in float64, shape (n,); NaN = none."""
     halved_kept: np.ndarray

@@ -26,7 +26,7 @@ def test_rows_far_apart():
 
 
 def test_the_zoo_differs_by_descriptors(tmp_path):
-    config = load("blueprint", {"population": 48, "generations": 3, "task.measure": 2.0})
+    config = load("blueprint", {"population": 96, "generations": 3, "task.measure": 2.0})
     run = Run.create(config, tmp_path / "run")
     run.evolve()
     with Store.open(run.record_path, write=True) as store:

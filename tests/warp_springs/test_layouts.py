@@ -303,6 +303,6 @@ def test_what_cannot_run_is_refused_in_one_line():
         ws.Simulation(cube, layout="rows")
     big = ws.shapes.lattice(10, 10, 10)
     with pytest.raises(
-        ValueError, match=r"robots\[1\] has 1331 masses, 'block' expects 384 or fewer"
+        ValueError, match=r"robots\[1\] has 1331 masses, 'block' expects 320 or fewer"
     ):
         ws.Simulation([cube, big], layout="block")

@@ -233,7 +233,8 @@ class Crowd:
     def _structs(self, packed: dict[str, np.ndarray]) -> dict[str, object]:
         """The structs of arrays, filled."""
         filled = {}
-        structs_of = zip(("model", "state"), gather_structs(self.features.precision), strict=True)
+        kinds = gather_structs(self.features.precision, self.features.traits.colliding)
+        structs_of = zip(("model", "state"), kinds, strict=True)
         for label, struct in structs_of:
             filled[label] = struct()
             for name, field in struct.vars.items():

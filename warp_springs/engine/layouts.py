@@ -15,7 +15,7 @@ LAYOUTS = ("auto", "lanes", "block", "flat")
 LARGE = 1025
 #: Threads of a block, for robots of up to as many masses. With more, a thread would not have the
 #: registers it needs (see benchmarks/cuda_static.py).
-BLOCK_SIZES = {"float32": (256, 512), "mixed": (256, 384), "float64": (256, 384)}
+BLOCK_SIZES = {"float32": (256, 512), "mixed": (256, 384), "float64": (256, 320)}
 
 
 def device_named(name: object) -> wp.Device:

@@ -173,7 +173,7 @@ if (leader) {
 @functools.cache
 def block(features: GatherFeatures, size: int) -> wp.Kernel:
     """The kernel that steps crowds in blocks of ``size`` threads."""
-    Model, State = gather_structs(features.precision)
+    Model, State = gather_structs(features.precision, features.traits.colliding)
     Run = run_type(features.precision)
     real = real_type(features.precision)
     module = wp.get_module(f"{features.name}_{size}")

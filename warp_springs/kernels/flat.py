@@ -206,7 +206,7 @@ if (leader)
 @functools.cache
 def threads(features: GatherFeatures) -> wp.Kernel:
     """The kernel that one of several threads launches to step one body on a CPU."""
-    Model, State = gather_structs(features.precision)
+    Model, State = gather_structs(features.precision, features.traits.colliding)
     Run = run_type(features.precision)
     module = wp.get_module(features.name)
     wp.set_module_options(CPU_OPTIONS, module)
@@ -414,7 +414,7 @@ class Launches(NamedTuple):
 @functools.cache
 def launches(features: GatherFeatures) -> Launches:
     """The kernels that step crowds a pass a launch."""
-    Model, State = gather_structs(features.precision)
+    Model, State = gather_structs(features.precision, features.traits.colliding)
     Run = run_type(features.precision)
     module = wp.get_module(features.name)
     wp.set_module_options({"enable_backward": False}, module)

@@ -45,6 +45,8 @@ from warp_springs.kernels.slot_passes import SLOT_PASSES
 
 __all__ = [
     "CHUNK",
+    "COLLISION_MODEL",
+    "COLLISION_STATE",
     "LOOKS",
     "MODEL",
     "ROBOT",
@@ -108,15 +110,6 @@ MODEL = {
     "outer_windows": np.float64,  # [row][2][slot], s
     "skins": REAL,  # [slice][3][slot]
     "bonds": REAL,  # [slice][10][slot]
-    # For collisions, see kernels.crowd_collisions.
-    "features": np.int32,
-    "meetings": np.int32,
-    "leaf_features": np.int32,  # the leaves of the trees, -1 for padding
-    "near_rows": np.int32,
-    "nears": np.int32,
-    "contacts": REAL,  # see warp_springs.engine.colliding
-    "touch_rows": np.int32,  # where the features of the mass in each slot begin
-    "touches": np.int32,  # three times the feature, plus its corner
     "quanta": REAL,  # in which the origin of a robot moves, m; in mixed precision
 }
 #: What stepping changes.
@@ -142,6 +135,23 @@ STATE = {
     "broken_at": np.float64,  # of each end, s
     "rates": REAL,  # quads: what the dashpots see of the velocities as a kick begins, m/s
     "middle_rates": REAL,  # and in the middle of it
+    "states": np.int32,  # Status
+    "state_times": np.float64,  # s
+    "flags": np.int32,  # reasons to stop a robot, found by the check; and by a look
+}
+#: What collisions add to both, see kernels.crowd_collisions. Kernels without them do without: with
+#: all arrays the parameters of a kernel are too large for the compiler to keep off the stack.
+COLLISION_MODEL = {
+    "features": np.int32,
+    "meetings": np.int32,
+    "leaf_features": np.int32,  # the leaves of the trees, -1 for padding
+    "near_rows": np.int32,
+    "nears": np.int32,
+    "contacts": REAL,  # see warp_springs.engine.colliding
+    "touch_rows": np.int32,  # where the features of the mass in each slot begin
+    "touches": np.int32,  # three times the feature, plus its corner
+}
+COLLISION_STATE = {
     "boxes": REAL,  # [node][6]
     "partners": np.int32,  # [feature][ROOM]
     "partner_counts": np.int32,
@@ -151,9 +161,6 @@ STATE = {
     "grips": REAL,
     "touched": np.int32,  # whether each feature touches another
     "feature_forces": REAL,  # forces on its masses [3][3], energy, power of its two losses
-    "states": np.int32,  # Status
-    "state_times": np.float64,  # s
-    "flags": np.int32,  # reasons to stop a robot, found by the check; and by a look
 }
 
 
@@ -251,7 +258,7 @@ auto look_up_origin = [=](int robot) {
 
 
 @functools.cache
-def gather_structs(precision: str) -> tuple[type, type]:
+def gather_structs(precision: str, colliding: bool) -> tuple[type, type]:
     """The structs of what stays and of what stepping changes."""
 
     def struct(name: str, table: dict) -> type:
@@ -259,4 +266,9 @@ def gather_structs(precision: str) -> tuple[type, type]:
         kinds = {key: real if kind is REAL else np.dtype(kind) for key, kind in table.items()}
         return array_struct(name, kinds)
 
-    return struct("Crowd", MODEL), struct("CrowdState", STATE)
+    if not colliding:
+        return struct("Crowd", MODEL), struct("CrowdState", STATE)
+    return (
+        struct("CollidingCrowd", MODEL | COLLISION_MODEL),
+        struct("CollidingCrowdState", STATE | COLLISION_STATE),
+    )

@@ -190,7 +190,7 @@ class Look(NamedTuple):
 @functools.cache
 def look(features: GatherFeatures) -> Look:
     """The kernels that look at crowds of these features."""
-    Model, State = gather_structs(features.precision)
+    Model, State = gather_structs(features.precision, features.traits.colliding)
     Run, Seen = run_type(features.precision), structs(features.precision).seen
     real = real_type(features.precision)
     module = wp.get_module(features.name + "_look")
