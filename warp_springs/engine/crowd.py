@@ -169,7 +169,7 @@ class Crowd:
             "chunks": len(self._given["model"].chunks) // len(CHUNK),
             "robots": self._robots,
             "teams": self._robots * self._given["team"],
-            "features": len(self._given["model"].features) // len(FEATURE),
+            "features": self._count_features(),
         }
 
     def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
@@ -229,6 +229,12 @@ class Crowd:
             setattr(run, name, value)
         run.exact_dt, run.substeps = constants[0], int(about["substeps"])
         return run
+
+    def _count_features(self) -> int:
+        """How many triangles, edges and masses can collide."""
+        if not self.features.traits.colliding:
+            return 0
+        return len(self._given["model"].features) // len(FEATURE)
 
     def _structs(self, packed: dict[str, np.ndarray]) -> dict[str, object]:
         """The structs of arrays, filled."""
