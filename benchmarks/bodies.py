@@ -18,7 +18,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import warp_springs as ws
+from benchmarks.search import finish
+from evolve import Evaluator
 from evolve.encodings import ENCODINGS
+from evolve.encodings.base import Genomes
 from evolve.search import Search
 from evolve.toml import load
 
@@ -26,6 +29,8 @@ SCENE = ws.Scene(ground=ws.Ground(), damping=4.0)
 DT = 1e-3
 BATCH = 1000
 """Genomes that are stepped together."""
+LOOKED_AT = 32
+"""Individuals of a search that get a second look."""
 
 
 def different(n: int, springs: int, seed: int) -> list[ws.Robot]:
@@ -122,8 +127,7 @@ def search(options: argparse.Namespace) -> None:
     }
     for name, seed in itertools.product(options.presets, range(1, options.seeds + 1)):
         found = Search(load(name, common | {"seed": seed}))
-        while not found.finished:
-            found.step()
+        genomes, fitness, *_ = finish(found, LOOKED_AT)
         _say(
             what="search",
             preset=name,
@@ -131,20 +135,14 @@ def search(options: argparse.Namespace) -> None:
             seed=seed,
             evaluations=found.optimizer.evaluations,
             steady=found.optimizer.best_fitness,
-            survivor=_survivor(found),
+            survivor=_survivor(found, genomes, fitness),
         )
         found.close()
 
 
-def _survivor(found: Search) -> float:
-    """Fitness of the best survivor of the last generation that passes the second look, or 0."""
-    from evolve.judging.evaluate import Evaluator
-
-    last = found.optimizer._survivors
-    look_at = np.argsort(-last.scores.worth)[:32]
-    robots = found.encoding.express(found.encoding.take(last.genomes, look_at))
-    fitness = last.scores.fitness[look_at]
-    look = Evaluator(found.config).second_look(list(robots), fitness)
+def _survivor(found: Search, genomes: Genomes, fitness: np.ndarray) -> float:
+    """Fitness of the best that passes the second look, or 0."""
+    look = Evaluator(found.config).second_look(list(found.encoding.express(genomes)), fitness)
     return float(np.max(fitness[look.survives], initial=0.0))
 
 

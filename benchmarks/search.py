@@ -29,6 +29,7 @@ from tyro.conf import arg
 
 import warp_springs as ws
 from evolve import ENCODINGS, OPTIMIZERS, Evaluator, Search, load
+from evolve.encodings.base import Genomes
 
 BASELINE = "random"
 KEPT = 9
@@ -85,17 +86,8 @@ def run(options: Options, preset: str, optimizer: str, encoding: str, seed: int)
     changes |= {"generations": options.generations, "population": options.population}
     search = Search(load(preset, changes))
     search.prepare()
-    started, cost, simulating = time.perf_counter(), 0, 0.0
-    genomes, fitness = None, np.empty(0)
-    while not search.finished:
-        generation = search.step()
-        cost += int(generation.scores.spring_evaluations.sum())
-        simulating += generation.scores.wall_time
-        fitness = np.concatenate([fitness, generation.scores.worth])
-        new = generation.candidates.genomes
-        genomes = new if genomes is None else search.encoding.concatenate([genomes, new])
-        kept = np.argsort(-fitness, kind="stable")[:KEPT]
-        genomes, fitness = search.encoding.take(genomes, kept), fitness[kept]
+    started = time.perf_counter()
+    genomes, fitness, cost, simulating = finish(search)
     robots = search.encoding.express(genomes)
     look = Evaluator(search.config).second_look(robots, fitness)
     champion = int(look.survives.argmax())
@@ -111,6 +103,26 @@ def run(options: Options, preset: str, optimizer: str, encoding: str, seed: int)
         seconds=time.perf_counter() - started,
         springs_per_second=cost / simulating,
     )
+
+
+def finish(search: Search, kept: int = KEPT) -> tuple[Genomes, np.ndarray, int, float]:
+    """Search to the end.
+
+    Returns:
+        The fittest individuals of all generations, their fitness, and what it took: spring
+        evaluations, and seconds of simulating.
+    """
+    cost, simulating, genomes, fitness = 0, 0.0, None, np.empty(0)
+    while not search.finished:
+        generation = search.step()
+        cost += int(generation.scores.spring_evaluations.sum())
+        simulating += generation.scores.wall_time
+        fitness = np.concatenate([fitness, generation.scores.worth])
+        new = generation.candidates.genomes
+        genomes = new if genomes is None else search.encoding.concatenate([genomes, new])
+        best = np.argsort(-fitness, kind="stable")[:kept]
+        genomes, fitness = search.encoding.take(genomes, best), fitness[best]
+    return genomes, fitness, cost, simulating
 
 
 def tabulate(outcomes: list[Outcome], options: Options) -> Table:

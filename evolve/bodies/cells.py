@@ -86,24 +86,9 @@ class Cells:
         return len(self.corners)
 
     @property
-    def points(self) -> np.ndarray:
-        """Places of the masses [m], shape (M, 3); may be set, as a simulation moves them."""
-        return self._points
-
-    @points.setter
-    def points(self, places: np.ndarray) -> None:
-        self._points = np.array(places, np.float64).reshape(self._points.shape)
-
-    @property
     def centres(self) -> np.ndarray:
         """Middles of the cells [m], shape (C, 3)."""
         return self._points[np.array(self.corners)].mean(axis=1)
-
-    @property
-    def lengths(self) -> np.ndarray:
-        """Mean length of the four edges of each cell along its heading [m], shape (C,)."""
-        ends = self._points[np.array(self.corners)]
-        return np.linalg.norm(ends[:, 4:] - ends[:, :4], axis=2).mean(axis=1)
 
     def free(self, cell: int, side: int) -> bool:
         """Whether nothing grew on a side of a cell."""

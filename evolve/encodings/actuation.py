@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from evolve.encodings.base import EncodingSettings
+from evolve.encodings.base import EncodingSettings, Interval
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -26,11 +26,11 @@ class ActuationSettings(EncodingSettings):
     The same for every encoding, so that a run changes its encoding by one word.
     """
 
-    rest_length: tuple[float, float] = (0.9, 1.1)
+    rest_length: Interval = (0.9, 1.1)
     """Lowest and highest mean rest length, in initial lengths of the spring."""
     amplitude: float = Field(0.25, ge=0.0)
     """Largest amplitude of the rest length, in initial lengths of the spring."""
-    stiffness: tuple[float, float] = (1000.0, 20000.0)
+    stiffness: Interval = (1000.0, 20000.0)
     """Lowest and highest stiffness [N/m]; genes are its logarithm."""
     muscles: Literal["all", "cables"] = "all"
     """Which springs have genes; the others stay as the body has them."""
@@ -42,13 +42,6 @@ class ActuationSettings(EncodingSettings):
     """Share of the genes, or springs, that a mutation changes, on average."""
     mutation_step: float = Field(0.15, gt=0.0)
     """Standard deviation of a mutation, as a share of a gene's range."""
-
-    @field_validator("rest_length", "stiffness")
-    @classmethod
-    def _ordered(cls, bounds: tuple[float, float]) -> tuple[float, float]:
-        if not 0.0 < bounds[0] <= bounds[1] < float("inf"):
-            raise ValueError("expected two finite numbers with 0 < lowest <= highest")
-        return bounds
 
 
 class FixedBody:

@@ -3,18 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ArrayGenomes", "Encoding", "EncodingSettings", "Genomes", "ListGenomes", "folded"]
+__all__ = [
+    "ArrayGenomes",
+    "Encoding",
+    "EncodingSettings",
+    "Genomes",
+    "Interval",
+    "ListGenomes",
+    "folded",
+]
 
 Genomes = Any
 """A population of genomes. Only its encoding looks inside; everybody else may call `len`."""
+
+
+def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
+    if not 0.0 < bounds[0] <= bounds[1] < float("inf"):
+        raise ValueError("expected two finite numbers with 0 < lowest <= highest")
+    return bounds
+
+
+Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
+"""The lowest and the highest of what is positive."""
 
 
 class EncodingSettings(BaseModel):

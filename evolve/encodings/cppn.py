@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from evolve.encodings.actuation import ActuationSettings
 from evolve.encodings.base import EncodingSettings
 from evolve.encodings.fields import ArrayField
-from evolve.encodings.networks import Networks
+from evolve.encodings.networks import Networks, NetworkSettings
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -18,18 +17,10 @@ if TYPE_CHECKING:
 __all__ = ["CppnEncoding", "CppnSettings"]
 
 
-class CppnSettings(ActuationSettings):
+class CppnSettings(NetworkSettings, ActuationSettings):
     """How far the network may grow, and how often its structure changes."""
 
     type: Literal["cppn"] = "cppn"
-    hidden: int = Field(12, ge=0, le=64)
-    """Most hidden nodes; a network begins without any."""
-    add_node: float = Field(0.1, ge=0.0, le=1.0)
-    """Share of the mutations that split a connection by a new node."""
-    add_connection: float = Field(0.15, ge=0.0, le=1.0)
-    """Share of the mutations that add a connection."""
-    drop_connection: float = Field(0.05, ge=0.0, le=1.0)
-    """Share of the mutations that remove a connection."""
 
 
 class CppnEncoding(ArrayField):

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from evolve.encodings.base import ArrayGenomes, EncodingSettings
-from evolve.encodings.networks import Networks
+from evolve.encodings.networks import Networks, NetworkSettings
 from evolve.encodings.voxels import VoxelBody, VoxelBodySettings
 
 if TYPE_CHECKING:
@@ -17,18 +17,12 @@ if TYPE_CHECKING:
 __all__ = ["CppnBodyEncoding", "CppnBodySettings"]
 
 
-class CppnBodySettings(VoxelBodySettings):
+class CppnBodySettings(NetworkSettings, VoxelBodySettings):
     """How far the network may grow, and how often its structure changes."""
 
     type: Literal["cppn_body"] = "cppn_body"
-    hidden: int = Field(12, ge=0, le=64)
-    """Most hidden nodes; a network begins without any."""
     add_node: float = Field(0.15, ge=0.0, le=1.0)
     """Share of the mutations that split a connection by a new node."""
-    add_connection: float = Field(0.15, ge=0.0, le=1.0)
-    """Share of the mutations that add a connection."""
-    drop_connection: float = Field(0.05, ge=0.0, le=1.0)
-    """Share of the mutations that remove a connection."""
     mutation_rate: float = Field(0.3, gt=0.0, le=1.0)
     """Share of the weights that a mutation changes, on average."""
     mutation_step: float = Field(0.1, gt=0.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from evolve.encodings.base import EncodingSettings
+from evolve.encodings.base import EncodingSettings, Interval
 
 __all__ = ["BodySettings", "EvolvingBody"]
 
@@ -22,19 +22,12 @@ class BodySettings(EncodingSettings):
     """Points that a body may have."""
     most_springs: int = Field(400, ge=6)
     """Springs that a body may have."""
-    rest_length: tuple[float, float] = (0.9, 1.1)
+    rest_length: Interval = (0.9, 1.1)
     """Lowest and highest mean rest length, in initial lengths of the spring."""
     amplitude: float = Field(0.2, ge=0.0, lt=1.0)
     """Largest amplitude of the rest length, in initial lengths of the spring."""
-    stiffness: tuple[float, float] = (1000.0, 20000.0)
+    stiffness: Interval = (1000.0, 20000.0)
     """Lowest and highest stiffness [N/m]; genes are its logarithm."""
-
-    @field_validator("rest_length", "stiffness")
-    @classmethod
-    def _ordered(cls, bounds: tuple[float, float]) -> tuple[float, float]:
-        if not 0.0 < bounds[0] <= bounds[1] < float("inf"):
-            raise ValueError("expected two finite numbers with 0 < lowest <= highest")
-        return bounds
 
 
 class EvolvingBody:

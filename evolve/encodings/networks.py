@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from pydantic import Field
 
-from evolve.encodings.base import folded
+from evolve.encodings.base import EncodingSettings, folded
 
-__all__ = ["FUNCTIONS", "Networks"]
+__all__ = ["FUNCTIONS", "NetworkSettings", "Networks"]
 
 FUNCTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "identity": lambda x: x,
@@ -22,6 +23,19 @@ FUNCTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 REACH = 4.0
 """Weights lie between minus and plus this."""
+
+
+class NetworkSettings(EncodingSettings):
+    """How far a network may grow, and how often its structure changes."""
+
+    hidden: int = Field(12, ge=0, le=64)
+    """Most hidden nodes; a network begins without any."""
+    add_node: float = Field(0.1, ge=0.0, le=1.0)
+    """Share of the mutations that split a connection by a new node."""
+    add_connection: float = Field(0.15, ge=0.0, le=1.0)
+    """Share of the mutations that add a connection."""
+    drop_connection: float = Field(0.05, ge=0.0, le=1.0)
+    """Share of the mutations that remove a connection."""
 
 
 class Networks:
