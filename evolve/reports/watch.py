@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from evolve.judging.evaluate import Evaluator
 from evolve.reports.subject import Subject, share
 
 if TYPE_CHECKING:
@@ -19,14 +20,14 @@ def watch(report: ws.Document, subject: Subject) -> None:
     film, zoo, duration = subject.film, subject.zoo, subject.shown
     cycles = f"{duration / subject.run.config.encoding.period:g} cycles"
     part = {"start": float(film.times[-1]) - duration, "duration": duration}
-    films = [report.film(film, f"The best, #{zoo[0]}, {cycles}.", 0, **part)]
-    if len(zoo) > 1:
-        words = f"The {len(zoo)} best side by side, {cycles}."
-        films.append(report.film(film, words, range(len(zoo)), **part))
+    alone = [report.film(film, f"The best, #{zoo[0]}, {cycles}.", 0, **part)]
     if film.scene.ground is not None:
         words = f"#{zoo[0]} dropped from as high as it is long, its muscles at work."
-        films.append(report.film(_fall(subject), words))
-    report.row(*films)
+        alone.append(report.film(_fall(subject), words, duration=duration))
+    report.row(*alone)
+    if len(zoo) > 1:
+        words = f"The {len(zoo)} best side by side, {cycles}."
+        report.row(report.film(film, words, range(len(zoo)), **part))
     report.row(
         report.player(
             film,
@@ -39,18 +40,9 @@ def watch(report: ws.Document, subject: Subject) -> None:
 
 
 def _fall(subject: Subject) -> ws.Result:
-    """The best dropped from as high as it is long, as long as a film lasts."""
-    import warp_springs as ws
-
-    robot, settings = subject.film.robots[0], subject.run.config.simulation
-    return ws.Simulation(
-        [robot.moved((0.0, 0.0, robot.diameter))],
-        subject.film.scene,
-        dt=settings.dt,
-        precision=settings.precision,
-        integrator=settings.integrator,
-        device=settings.device,
-    ).run(subject.shown, fps=30)
+    """The trial of the best, begun as high above the floor as it is long."""
+    robot = subject.film.robots[0]
+    return Evaluator(subject.run.config).film([robot.moved((0.0, 0.0, robot.diameter))])
 
 
 def _page_facts(subject: Subject) -> Iterator[dict[str, str]]:
