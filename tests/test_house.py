@@ -82,3 +82,27 @@ def test_the_readme_snippets_run(tmp_path):
 def test_the_readme_links_to_files_that_exist():
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).is_file(), target
+
+
+def test_every_program_and_picture_that_a_text_names_is_there():
+    texts = [
+        *ROOT.glob("*.md"),
+        *ROOT.glob("*/guide/*.md"),
+        *SOURCES,
+        *ROOT.glob("benchmarks/*.py"),
+    ]
+    named = r"benchmarks/[\w/]+\.(?:py|png|webp)|python -m benchmarks(?:\.\w+)+"
+    for text in texts:
+        for name in re.findall(named, text.read_text(encoding="utf-8")):
+            module = name.rpartition(" ")[2]
+            path = name if module == name else module.replace(".", "/") + ".py"
+            assert (ROOT / path).is_file(), (text, name)
+
+
+@pytest.mark.parametrize("kind", ["ENCODINGS", "OPTIMIZERS", "FITNESS"])
+def test_the_guide_to_evolution_names_all_there_is(kind):
+    from evolve import encodings, fitness, optimizers
+
+    guide = (ROOT / "evolve" / "guide" / "evolution.md").read_text(encoding="utf-8")
+    known = next(getattr(m, kind) for m in (encodings, optimizers, fitness) if hasattr(m, kind))
+    assert set(known) <= set(re.findall(r"[`\"](\w+)[`\"]", guide))
