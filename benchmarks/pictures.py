@@ -3,8 +3,8 @@
     python benchmarks/pictures.py                    # all of them: half an hour on two cores
     python benchmarks/pictures.py scene.png zoo.png  # some of them, by name
 
-They are written to benchmarks/figures. What needs a run of evolution makes one, of the walker
-preset, in a folder that is kept with --run DIR and used again if it is there.
+They are written to benchmarks/figures. What needs runs of evolution makes them, of the packaged
+presets, in a folder that is kept with --runs DIR, where those that are there are used again.
 """
 
 from __future__ import annotations
@@ -13,17 +13,26 @@ import argparse
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, ImageSequence
 
 import warp_springs as ws
 
 HERE = Path(__file__).parent
-FILM_SIZE = (960, 540)
-FILM_SECONDS = 3.0
+ZOO = (
+    *("walker", "creature", "tripod"),
+    *("blueprint", "starfish", "critter"),
+    *("worm", "octahedron", "snake"),
+)
+"""Presets whose champions are shown, row by row."""
+COLUMNS = 3
+TILE, FILM_TILE = (424, 238), (318, 178)
+GAP = 4
+FILM_SECONDS, FILM_FPS = 3.0, 15
 
 
 class Studio:
@@ -31,58 +40,83 @@ class Studio:
 
     Attributes:
         figures: Where pictures go.
-        run: Folder of the run of evolution.
+        runs: Folder of the runs of evolution.
     """
 
-    def __init__(self, figures: Path, run: Path):
-        self.figures, self.run = figures, run
+    def __init__(self, figures: Path, runs: Path):
+        self.figures, self.runs = figures, runs
 
-    # -- of a run of evolution -----------------------------------------------------------------
+    # -- of runs of evolution ------------------------------------------------------------------
+
+    def evolved(self, preset: str) -> Path:
+        """Folder of a finished run of a preset."""
+        folder = self.runs / preset
+        if not (folder / "learning_curve.png").exists():
+            _do("-m", "evolve.cli", "run", preset, "--out", folder)
+        return folder
 
     @cached_property
-    def walkers(self) -> tuple[ws.Result, list[str]]:
-        """The nine best of the walker preset, moving, and what is written beside them."""
+    def champions(self) -> dict[str, tuple[ws.Result, str]]:
+        """The champion of each preset of the zoo, moving, and what is written beside it."""
+        return {preset: self._champion(preset) for preset in ZOO}
+
+    def _champion(self, preset: str) -> tuple[ws.Result, str]:
         from evolve.reports.export import trial
-        from evolve.reports.show import label
         from evolve.run import Run
 
-        if not (self.run / "learning_curve.png").exists():
-            _do("-m", "evolve.cli", "run", "walker", "--out", self.run)
-        run = Run.open(self.run)
+        run = Run.open(self.evolved(preset))
         with run.read() as store:
-            zoo = store.finalists()[:9]
-            motion = trial(run, store, [member.id for member in zoo], energy=True)
-            return motion, [label(member) for member in zoo]
+            best = store.finalists()[0]
+            motion = trial(run, store, [best.id], energy=True)
+        return motion, f"{preset}   {best.fitness:.2f}"
 
     def zoo(self) -> None:
-        """The nine best, each in its tile."""
-        motion, labels = self.walkers
-        ws.render(motion, self.figures / "zoo.png", layout="panel", labels=labels)
+        """The champions, each in its tile."""
+        with tempfile.TemporaryDirectory() as folder:
+            tiles = []
+            for preset, (motion, label) in self.champions.items():
+                path = Path(folder, f"{preset}.png")
+                ws.render(motion, path, caption=label, size=TILE)
+                tiles.append(Image.open(path).convert("RGB"))
+            _panel(tiles).save(self.figures / "zoo.png")
 
     def zoo_film(self) -> None:
-        """The same, running."""
-        motion, labels = self.walkers
-        ws.render(
-            motion,
+        """The same, running: the last seconds of their trials."""
+        with tempfile.TemporaryDirectory() as folder:
+            films = []
+            for preset, (motion, label) in self.champions.items():
+                path = Path(folder, f"{preset}.webp")
+                ws.render(
+                    motion,
+                    path,
+                    caption=label,
+                    size=FILM_TILE,
+                    fps=FILM_FPS,
+                    start=motion.times[-1] - FILM_SECONDS,
+                    duration=FILM_SECONDS,
+                    clock=False,
+                )
+                with Image.open(path) as film:
+                    films.append([f.convert("RGB") for f in ImageSequence.Iterator(film)])
+        first, *others = [_panel(tiles) for tiles in zip(*films, strict=True)]
+        first.save(
             self.figures / "zoo.webp",
-            layout="panel",
-            labels=labels,
-            size=FILM_SIZE,
-            fps=15,
-            start=1.0,
-            duration=FILM_SECONDS,
-            clock=False,
+            save_all=True,
+            append_images=others,
+            duration=round(1000 / FILM_FPS),
+            loop=0,
+            quality=65,
+            method=6,
         )
 
     def learning_curve(self) -> None:
         """Fitness against evaluations."""
-        _ = self.walkers
-        source = self.run / "learning_curve.png"
+        source = self.evolved("walker") / "learning_curve.png"
         (self.figures / "learning_curve.png").write_bytes(source.read_bytes())
 
     def overview(self) -> None:
-        """Every plot of the champion's trial."""
-        motion, _ = self.walkers
+        """Every plot of the walker's trial."""
+        motion, _ = self._champion("walker")
         ws.plots.overview(motion).savefig(self.figures / "overview.png", dpi=90)
 
     # -- of scenes -----------------------------------------------------------------------------
@@ -140,6 +174,16 @@ def _with(result: ws.Result, obstacles: tuple, robot: ws.Robot) -> ws.Result:
     return dataclasses.replace(result, scene=scene, robots=(robot,))
 
 
+def _panel(tiles: Sequence[Image.Image]) -> Image.Image:
+    """Tiles of one size side by side, row by row, with white gaps."""
+    width, height = (n + GAP for n in tiles[0].size)
+    rows = -(-len(tiles) // COLUMNS)
+    panel = Image.new("RGB", (COLUMNS * width - GAP, rows * height - GAP), "white")
+    for i, tile in enumerate(tiles):
+        panel.paste(tile, (i % COLUMNS * width, i // COLUMNS * height))
+    return panel
+
+
 def _do(*words: object) -> None:
     """Run a program of this interpreter and let it talk."""
     subprocess.run([sys.executable, *map(str, words)], check=True)
@@ -149,7 +193,7 @@ def main() -> None:
     """Make what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
-    parser.add_argument("--run", type=Path, help="folder of the run of evolution, kept")
+    parser.add_argument("--runs", type=Path, help="folder of the runs of evolution, kept")
     parser.add_argument("--out", type=Path, default=HERE / "figures", help="where pictures go")
     options = parser.parse_args()
     if unknown := set(options.names) - set(PICTURES):
@@ -157,7 +201,7 @@ def main() -> None:
     ws.quiet()
     options.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        studio = Studio(options.out, options.run or Path(folder, "walker"))
+        studio = Studio(options.out, options.runs or Path(folder))
         for name in options.names or PICTURES:
             print(f"making {name}", flush=True)
             PICTURES[name](studio)
