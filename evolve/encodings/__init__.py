@@ -15,6 +15,7 @@ from evolve.encodings.cppn_body import CppnBodyEncoding, CppnBodySettings
 from evolve.encodings.direct import DirectEncoding, DirectSettings
 from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
 from evolve.encodings.fourier import FourierEncoding, FourierSettings
+from evolve.encodings.grammar import GrammarEncoding, GrammarSettings
 from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
 from evolve.encodings.lsystem import LsystemEncoding, LsystemSettings
 from evolve.encodings.morphology import MorphologyEncoding, MorphologySettings
@@ -43,6 +44,8 @@ __all__ = [
     "FixedBody",
     "FourierEncoding",
     "FourierSettings",
+    "GrammarEncoding",
+    "GrammarSettings",
     "HarmonicsEncoding",
     "HarmonicsSettings",
     "LsystemEncoding",
@@ -71,5 +74,6 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "controller": ControllerEncoding,
     "arena": ArenaEncoding,
     "lsystem": LsystemEncoding,
+    "grammar": GrammarEncoding,
 }
 """Name in the configuration -> class."""
