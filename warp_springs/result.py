@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from warp_springs.body.tensions import controlled
 from warp_springs.energy import Energy
 from warp_springs.scene import Scene
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from warp_springs.robot import Robot
 
 __all__ = ["Result"]
+
+_ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,8 @@ class Result:
     _frames: Mapping[int, np.ndarray] = field(repr=False)
     _worn: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
     _signals: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
+    _flowed: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
+    _heard: Mapping[int, np.ndarray] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         """Number of robots N."""
@@ -136,6 +142,78 @@ class Result:
         """
         return self._signals.get(self._index(robot), np.zeros(0))
 
+    def signal_frames(self, robot: int) -> np.ndarray:
+        """The same in every frame of a recorded robot, shape (F, outputs)."""
+        return self._heard.get(self._index(robot), np.zeros((len(self.frames(robot)), 0)))
+
+    def clock(self, robot: int) -> np.ndarray:
+        """Time that each frame of a robot shows [s], (F,): it stands still once it is stopped."""
+        return np.fmin(self.times, self.status_time[self._index(robot)])
+
+    def end_clock(self, robot: int) -> float:
+        """The same at the end of the run [s]."""
+        return float(np.fmin(self.end_time, self.status_time[self._index(robot)]))
+
+    def rest_lengths(self, robot: int) -> np.ndarray:
+        """Rest lengths of a robot's springs at the end [m], shape (S,).
+
+        As `Robot.rest_length_at`, with what its controllers ask for and how far springs yielded.
+        """
+        index, time = self._index(robot), self.end_clock(robot)
+        return _sum(self.robots[index].rest_length_at(time), self._end_change(index))
+
+    def rest_length_frames(self, robot: int, frames: ArrayLike | slice = _ALL) -> np.ndarray:
+        """The same in frames of a recorded robot, shape (F, S); arguments as `tension_frames`."""
+        told = self.robots[self._index(robot)].rest_length_at(self.clock(robot)[frames])
+        return _sum(told, self.rest_length_change(robot, frames))
+
+    def tension(self, robot: int) -> np.ndarray:
+        """Force in each spring of a robot at the end [N], positive where stretched, shape (S,).
+
+        As `Robot.tension`, with its `rest_lengths`; zero in springs that are broken.
+        """
+        index, time = self._index(robot), self.end_clock(robot)
+        force = self.robots[index].tension(self.positions(index), time, self._end_change(index))
+        return np.where(self.broken(index) <= time, 0.0, force)
+
+    def tension_frames(self, robot: int, frames: ArrayLike | slice = _ALL) -> np.ndarray:
+        """The same in frames of a recorded robot, shape (F, S).
+
+        Args:
+            robot: Its index.
+            frames: Indices of the frames, shape (F,), or a slice; all by default.
+        """
+        index, time = self._index(robot), self.clock(robot)[frames]
+        positions = np.asarray(self.frames(index)[frames], np.float64)
+        change = self.rest_length_change(index, frames)
+        force = self.robots[index].tension(positions, time, change)
+        broken = self.broken(index)
+        return np.where(broken <= time[:, None], 0.0, force) if np.isfinite(broken).any() else force
+
+    def rest_length_change(
+        self, robot: int, frames: ArrayLike | slice = _ALL, *, yielded: bool = True
+    ) -> np.ndarray | None:
+        """By how much rest lengths differ from what `Robot.rest_length_at` says [m], (F, S).
+
+        What controllers ask for in frames of a recorded robot and, unless it is not wanted, how far
+        springs yielded; ``None`` where there is neither.
+        """
+        index = self._index(robot)
+        heard = self.signal_frames(index)[frames]
+        flowed = self._flowed.get(index) if yielded else None
+        return self._change(index, heard, None if flowed is None else flowed[frames])
+
+    def _end_change(self, robot: int) -> np.ndarray | None:
+        flowed = self.yielded(robot) if robot in self._worn else None
+        return self._change(robot, self.signals(robot), flowed)
+
+    def _change(
+        self, robot: int, signals: np.ndarray, flowed: np.ndarray | None
+    ) -> np.ndarray | None:
+        if not signals.shape[-1]:
+            return flowed
+        return _sum(controlled(self.robots[robot], signals), flowed)
+
     def _wear(self, robot: int) -> np.ndarray:
         robot = self._index(robot)
         if robot in self._worn:
@@ -148,3 +226,7 @@ class Result:
         if not -count <= robot < count:
             raise IndexError(f"robot: got {robot}, expected an index below {count}")
         return int(robot) % count
+
+
+def _sum(values: np.ndarray, more: np.ndarray | None) -> np.ndarray:
+    return values if more is None else values + more

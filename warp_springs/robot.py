@@ -178,13 +178,17 @@ class Robot(Placing, Verbs):
         """Rest lengths at a time [m]: shape (S,) for one time [s], (F, S) for times (F,)."""
         return rest_length_at(self, t)
 
-    def tension(self, positions: ArrayLike, t: ArrayLike) -> FloatArray:
+    def tension(
+        self, positions: ArrayLike, t: ArrayLike, change: FloatArray | None = None
+    ) -> FloatArray:
         """Force in each spring [N], positive where stretched: Hooke's law k (L - L0(t)), or what
-        the elements of the robot make of it; without dashpots, and as if nothing had yielded.
+        the elements of the robot make of it; without dashpots. `Result.tension` is that of a run.
 
         Args:
             positions: Positions [m], shape (M, 3) with one time, (F, M, 3) with times (F,).
             t: The time [s] or the times of the frames, shape (F,).
+            change: By how much rest lengths are longer than `rest_length_at` says [m], (S,) or
+                (F, S): what controllers ask for and how far springs have yielded.
 
         Returns:
             Forces, shape (S,) or (F, S).
@@ -199,7 +203,7 @@ class Robot(Placing, Verbs):
                 f"positions: shape {positions.shape} given, {expected} expected for times of "
                 f"shape {t.shape} and {self.n_masses} masses"
             )
-        return tension(self, spring_lengths(positions, self.springs), t)
+        return tension(self, spring_lengths(positions, self.springs), t, change)
 
     # -- new robots from this one ------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from warp_springs.engine.control import pilots
 from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.engine.method import AUTO_DT, Method
 from warp_springs.engine.packing import aligned
-from warp_springs.engine.slices import Tape, cut, run_all
+from warp_springs.engine.slices import Tape, cut, flow_places, run_all
 from warp_springs.engine.worlds import Member, gathered, on_a_grid
 from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of
 from warp_springs.kernels.law import EVALUATIONS
@@ -190,7 +190,9 @@ class Simulation:
             if pilot is not None:
                 pilot.open(ledger=energy)
         tapes = [
-            Tape(piece, self._batch.slots, recorded, frame_steps, energy, pilot)
+            Tape(
+                piece, self._batch.slots, recorded, frame_steps, energy, pilot, self._batch.wearing
+            )
             for piece, pilot in zip(self._slices, self._pilots, strict=True)
         ]
 
@@ -275,7 +277,7 @@ class Simulation:
         worn, broken = self._buffers["worn"], self._buffers["broken_at"]
         found = {}
         for robot, (place, lane) in self._batch.wearing.items():
-            found[robot] = np.stack([broken[place], worn[2 * (place - lane) + lane]])
+            found[robot] = np.stack([broken[place], worn[flow_places(place, lane)]])
         return found
 
     def _find_gains(self, energy: Energy, times, status, stopped_at) -> None:
@@ -324,6 +326,8 @@ class Simulation:
             _positions=buffers["seen_positions"].copy(),
             _velocities=buffers["seen_velocities"].copy(),
             _frames={i: f for tape in tapes for i, f in tape.frames_by_robot().items()},
+            _heard={i: s for tape in tapes for i, s in tape.signals.by_robot().items()},
+            _flowed={i: y for tape in tapes for i, y in tape.flowed.by_robot().items()},
         )
 
 

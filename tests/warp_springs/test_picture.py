@@ -1,13 +1,14 @@
 """Pictures of results: colours, arrangement, files, and errors that say what is wrong."""
 
+import dataclasses
 import errno
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import warp_springs as ws
+from tests.warp_springs.posed import posed
 from warp_springs.view import appearance
 from warp_springs.view.look import Look
 from warp_springs.view.pictures import picture
@@ -20,27 +21,11 @@ from warp_springs.view.pictures.scenery import draw_scene
 SIZE = (160, 120)
 
 
-def result_of(robots, poses, ground=True, times=None) -> SimpleNamespace:
-    """Return what `picture` reads of a result: frames (F, M, 3) of each robot."""
-    times = np.arange(len(poses[0])) / 30 if times is None else times
-    return SimpleNamespace(
-        robots=robots,
-        scene=ws.Scene(ground=ws.Ground() if ground else None),
-        times=times,
-        status_time=np.full(len(robots), np.nan),
-        end_time=float(times[-1]),
-        recorded=tuple(range(len(robots))),
-        frames=lambda i: poses[i],
-        broken=lambda i: np.full(robots[i].n_springs, np.nan),
-        positions=lambda i: poses[i][-1],
-    )
-
-
 @pytest.fixture(scope="module")
 def cubes():
     robots = [ws.shapes.cube().moved((0, 0, 0.1 * i)) for i in range(3)]
     squeezed = [np.stack((r.positions, r.positions * (1, 1, 0.9))) for r in robots]
-    return result_of(robots, squeezed)
+    return posed(robots, squeezed)
 
 
 def spring_pixels(stretch, color="stress"):
@@ -50,7 +35,7 @@ def spring_pixels(stretch, color="stress"):
     frames = robot.positions[None] * [(stretch, 1, 1)]
     camera = Camera(eye=(0.0, -1.0, 0.1), target=(0.0, 0.0, 0.1))
     pixels = picture.picture(
-        result_of([robot], [frames], ground=False), size=SIZE, camera=camera, color=color
+        posed([robot], [frames], ground=False), size=SIZE, camera=camera, color=color
     )
     return pixels[59, 80].astype(int)
 
@@ -119,7 +104,7 @@ def test_skin_and_ground_and_labels_are_drawn_or_not(cubes):
     labelled = picture.picture(cubes, size=SIZE, labels=["a", "b", "ω"])
     changed = (labelled != plain).any(axis=2)
     assert 0 < changed.mean() < 0.1
-    cubes_in_space = result_of(cubes.robots, [cubes.frames(i) for i in range(3)], ground=False)
+    cubes_in_space = posed(cubes.robots, [cubes.frames(i) for i in range(3)], ground=False)
     space = picture.picture(cubes_in_space, size=SIZE)
     assert not np.array_equal(space, plain)
     assert len(np.unique(space[-1], axis=0)) == 1  # no checker
@@ -151,7 +136,7 @@ def test_grid_keeps_robots_apart_in_reading_order():
 def test_a_single_mass_without_springs_is_drawn():
     none = np.zeros((0, 2), int)
     robot = ws.Robot(masses=1.0, positions=[(5.0, 5.0, 0.3)], springs=none, stiffness=1.0)
-    pixels = picture.picture(result_of([robot], [robot.positions[None]]), size=SIZE)
+    pixels = picture.picture(posed([robot], [robot.positions[None]]), size=SIZE)
     assert pixels[60, 80].max() < 90
 
 
@@ -176,10 +161,10 @@ def test_wrong_arguments_are_named(cubes, tmp_path, change, message):
 
 
 def test_robot_that_was_not_recorded_is_named(cubes, tmp_path):
-    some = SimpleNamespace(**{**vars(cubes), "recorded": (0, 2)})
+    some = dataclasses.replace(cubes, recorded=(0, 2))
     with pytest.raises(ValueError, match="robot 1 was not recorded; recorded are 0, 2"):
         ws.render(some, tmp_path / "x.png", robots=[0, 1])
-    none = SimpleNamespace(**{**vars(cubes), "recorded": ()})
+    none = dataclasses.replace(cubes, recorded=())
     with pytest.raises(ValueError, match="no robot was recorded"):
         ws.render(none, tmp_path / "x.png")
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import io
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import warp_springs as ws
+from tests.warp_springs.posed import posed
 
 
 @pytest.fixture(scope="module")
@@ -96,25 +96,13 @@ def test_uneven_masses_weigh_in(ax, cube):
     assert ax.lines[0].get_ydata()[0] == pytest.approx(heavy.center_of_mass[2])
 
 
-def recorded(robot, poses, fps=10, ground=True):
-    """What plots read of a result, with motion made up: frames (F, M, 3)."""
-    times = np.arange(len(poses)) / fps
-    return SimpleNamespace(
-        robots=[robot],
-        scene=SimpleNamespace(ground=object() if ground else None),
-        times=times,
-        energy=None,
-        frames=lambda i: poses,
-    )
-
-
 @pytest.fixture
 def runner(cube):
     """A cube with muscles of 2 cycles/s that runs along y at 0.5 m/s, swinging once a cycle."""
     body = cube.replace(amplitude=0.01, omega=4 * np.pi)
     t = np.arange(41) / 20
     way = np.stack((0 * t, 0.5 * t + 0.02 * np.sin(4 * np.pi * t), 0 * t), axis=1)
-    return recorded(body, cube.positions + way[:, None], fps=20)
+    return posed([body], [cube.positions + way[:, None]], fps=20)
 
 
 def test_speed_and_its_progress_over_a_cycle(ax, runner):
@@ -148,7 +136,7 @@ def test_footfall_shows_who_is_down_and_when(ax, cube):
     for edge, y in zip(down, (0.0, 0.1), strict=True):
         feet = (cube.positions[:, 2] == 0) & (cube.positions[:, 1] == y)
         poses[:, feet, 2] = np.where(edge, 0.0, 0.05)[:, None]
-    ws.plots.footfall(ax, recorded(cube, poses))
+    ws.plots.footfall(ax, posed([cube], [poses], fps=10))
     spans = [
         [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in bars.get_paths()]
         for bars in ax.collections
@@ -165,7 +153,7 @@ def test_stress_histogram_counts_all_springs_and_frames(ax):
     line = np.array([[0.0, 0, 1], [0.1, 0, 1], [0.2, 0, 1]])
     robot = ws.Robot(masses=1.0, positions=line, springs=[(0, 1), (1, 2)], stiffness=100.0)
     poses = np.stack([line * (scale, 1, 1) for scale in (0.5, 1.0, 1.0, 2.0)])
-    ws.plots.stress_histogram(ax, recorded(robot, poses), bins=5)
+    ws.plots.stress_histogram(ax, posed([robot], [poses]), bins=5)
     shares = [bar.get_height() for bar in ax.patches]  # of -5 N, 0, 0, +10 N, on -10 ... 10 N
     np.testing.assert_allclose(shares, [0, 25, 50, 0, 25])
     red, _, blue = ax.patches[-1].get_facecolor()[:3]
@@ -207,7 +195,7 @@ def test_what_is_missing_is_said(ax, result, cube):
         ws.plots.energies(ax, without)
     with pytest.raises(ValueError, match="robot: got 2, expected 0 to 1"):
         ws.plots.energies(ax, result, robot=2)
-    space = recorded(cube, cube.positions[None], ground=False)
+    space = posed([cube], [cube.positions[None]], ground=False)
     with pytest.raises(ValueError, match="no ground"):
         ws.plots.footfall(ax, space)
     with pytest.raises(ValueError, match="needs two frames"):

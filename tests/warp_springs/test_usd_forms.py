@@ -98,21 +98,26 @@ def test_large_bodies_become_points_and_their_surface(tmp_path):
     assert len(points) % (2 * body.n_springs) == 0
 
 
-def test_a_surface_keeps_what_its_springs_are(cube):
+def test_a_surface_keeps_what_its_springs_are(cube, tmp_path):
     inner = ws.shapes.lattice(3, 3, 3)
-    body = inner.replace(stiffness=np.arange(1.0, inner.n_springs + 1))
+    body = inner.replace(stiffness=np.arange(1000.0, inner.n_springs + 1000.0))
     body = body.made_of(ws.materials.BONE, where=np.arange(100)).with_cables(np.arange(50))
     body = body.with_winch([0.0, 1.0], [0.0, 0.01], springs=np.arange(20))
-    shown = usd_layout.surface_only(body)
-    kept = [tuple(s) in set(map(tuple, shown.springs.tolist())) for s in body.springs.tolist()]
-    assert 0 < shown.n_springs == sum(kept) < body.n_springs
-    positions = body.positions * 1.1
-    np.testing.assert_array_equal(
-        shown.tension(positions, 0.5), body.tension(positions, 0.5)[np.array(kept)]
-    )
-    assert usd_layout.surface_only(cube) is cube  # nothing is inside a cube
-    bare = inner.replace(faces=None)
-    assert usd_layout.surface_only(bare) is bare
+    kept = usd_layout.surface_springs(body)
+    outside = np.isin(np.arange(body.n_masses), body.faces)
+    assert kept.tolist() == [i for i, ends in enumerate(body.springs) if outside[ends].all()]
+    assert 0 < len(kept) < body.n_springs
+    result = ws.Simulation(body, ws.Scene()).run(0.1, fps=FPS)
+    stage = opened(ws.export_usd(result, tmp_path / "surface.usdc", springs="surface"))
+    (robot,) = robots_of(stage)
+    primvar = UsdGeom.PrimvarsAPI(form(robot, "bars")).GetPrimvar("displayColor")
+    scale = robot.GetCustomDataByKey("warp_springs:stressScale")
+    shown = np.array(primvar.GetIndicesAttr().Get(3)).reshape(-1, len(kept))[0]
+    expected = appearance.stress_index(result.tension_frames(0)[3, kept], scale)
+    np.testing.assert_array_equal(shown, expected)
+    assert len(np.unique(shown)) > 5
+    for whole in (cube, inner.replace(faces=None)):  # nothing is inside a cube
+        assert len(usd_layout.surface_springs(whole)) == whole.n_springs
 
 
 @pytest.mark.parametrize("geometry", ["points", "mesh"])
@@ -202,6 +207,25 @@ def test_bars_are_coloured_by_their_materials(cube, geometry, tmp_path):
             surface = UsdShade.Shader(bound.GetPrim().GetChild("Surface"))
             color = surface.GetInput("diffuseColor").Get()
             np.testing.assert_allclose(color, kind.rgb, rtol=1e-6)
+
+
+@pytest.mark.parametrize("geometry", ["skel", "points", "mesh"])
+@pytest.mark.parametrize("masses", [[2, 5], range(8)])
+def test_masses_that_are_held_are_grey(cube, geometry, masses, tmp_path):
+    result = ws.Simulation(cube.fixed(masses), ws.Scene(ground=None)).run(0.05, fps=FPS)
+    path = ws.export_usd(result, tmp_path / "h.usdc", geometry=geometry)
+    assert validation_errors(path) == []
+    stage = opened(path)
+    balls = form(robots_of(stage)[0], "masses")
+    colors = np.array(UsdGeom.PrimvarsAPI(balls).GetPrimvar("displayColor").ComputeFlattened())
+    grey = np.abs(colors.reshape(8, -1, 3) - appearance.HELD).max(axis=(1, 2)) < 1e-6
+    assert np.flatnonzero(grey).tolist() == list(masses)
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(balls)):
+        bound, _ = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()
+        assert bound.GetPath().name == {"Held": "Held", "Free": "Mass"}[subset.GetPrim().GetName()]
+        faces = np.array(subset.GetIndicesAttr().Get()) // (len(colors) // 8)
+        of = list(masses) if subset.GetPrim().GetName() == "Held" else np.flatnonzero(~grey)
+        assert sorted(set(faces.tolist())) == list(of)
 
 
 # -- obstacles, pushes, cameras ----------------------------------------------------------------

@@ -12,7 +12,7 @@ from warp_springs.geometry import FloatArray
 if TYPE_CHECKING:
     from warp_springs.robot import Robot
 
-__all__ = ["rest_length_at", "tension"]
+__all__ = ["controlled", "rest_length_at", "tension"]
 
 
 def rest_length_at(robot: Robot, t: ArrayLike) -> FloatArray:
@@ -32,10 +32,26 @@ def rest_length_at(robot: Robot, t: ArrayLike) -> FloatArray:
     return rest
 
 
-def tension(robot: Robot, lengths: FloatArray, t: ArrayLike) -> FloatArray:
+def controlled(robot: Robot, signals: FloatArray) -> FloatArray:
+    """By how much controllers change rest lengths [m], (..., S), for their outputs (..., n)."""
+    change = np.zeros((*signals.shape[:-1], robot.n_springs))
+    first = 0
+    for controller in robot.elements.controllers:
+        muscles = np.array(controller.muscles)
+        asked = signals[..., first + np.array(controller.outputs)]
+        change[..., muscles] = controller.reach * robot.rest_length[muscles] * asked
+        first += controller.n_outputs
+    return change
+
+
+def tension(
+    robot: Robot, lengths: FloatArray, t: ArrayLike, change: FloatArray | None = None
+) -> FloatArray:
     """`Robot.tension` for given lengths [m], (S,) or (F, S)."""
     elements = robot.elements
     stretch = lengths - rest_length_at(robot, t)
+    if change is not None:
+        stretch = stretch - change
     force = stretch if elements.slope is None else elements.slope * stretch
     if elements.hinges is not None:
         at, part = np.moveaxis(elements.hinges, -1, 0)

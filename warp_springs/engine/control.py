@@ -98,6 +98,7 @@ class Pilot:
     """The controllers of a piece: read, think, set muscles, every so many steps.
 
     Attributes:
+        outputs: Robot -> where its outputs begin and end among those of all.
         work: What they put into the robots so far [J], shape (N,), where the ledger is open.
     """
 
@@ -121,7 +122,7 @@ class Pilot:
         kernel = control(piece.precision, ground, count)
         self._lanes = batch.slots.lane_indices(np.array(members), ENERGIES)
         self._members = np.array(members)
-        self._outputs = tables.outputs
+        self.outputs = tables.outputs
         self._groups = []
         for every, rows in sorted(tables.grouped(dt).items()):
             chosen = self._chosen(kernel, reach, tables.brains[rows])
@@ -173,10 +174,14 @@ class Pilot:
         seen = self._piece.buffers["seen_energies"][self._lanes]
         return seen[:, _CHANGED].astype(np.float64).sum(axis=1)
 
+    def heard(self) -> np.ndarray:
+        """Outputs of all controllers, those of a robot at its `outputs`."""
+        return self._tables.signals.numpy()
+
     def signals(self) -> dict[int, np.ndarray]:
         """Outputs of the controllers of each robot, end to end."""
-        signals = self._tables.signals.numpy()
-        return {robot: signals[a:b].copy() for robot, (a, b) in self._outputs.items()}
+        signals = self.heard()
+        return {robot: signals[a:b].copy() for robot, (a, b) in self.outputs.items()}
 
 
 class _Tables:

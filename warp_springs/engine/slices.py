@@ -16,10 +16,11 @@ from warp_springs.batch import Batch, Group, Slots
 from warp_springs.engine.control import Pilot, Reach
 from warp_springs.engine.crowd import Crowd, crowds
 from warp_springs.engine.packing import aligned
+from warp_springs.engine.reel import Reel
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 
-__all__ = ["Slice", "Tape", "cut", "run_all"]
+__all__ = ["Slice", "Tape", "cut", "flow_places", "run_all"]
 
 #: Slices a thread, so that a thread that is done early takes over work of another.
 SLICES_PER_THREAD = 4
@@ -143,9 +144,12 @@ class Tape:
     Attributes:
         members: Robots of the slice, shape (n,), if energies are asked for.
         recorded: Those whose frames are kept.
-        frames: Their positions [m], flat, shape (F, 3 * sum of M).
+        frames: Their positions [m].
+        signals: What the controllers of those who have any ask for.
+        flowed: How far the springs of those that may break or yield have flowed [m].
         energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
         pilot: Who sets muscles between the steps, if anybody.
+        wearing: As in `Batch`.
         done: Steps done so far.
         taken: Frames taken so far.
     """
@@ -156,10 +160,13 @@ class Tape:
     frame_steps: Sequence[int]
     energy: bool
     pilot: Pilot | None = None
+    wearing: Mapping[int, tuple[np.ndarray, int]] = field(default_factory=dict)
     done: int = 0
     taken: int = 0
     members: np.ndarray = field(init=False)
-    frames: np.ndarray = field(init=False)
+    frames: Reel = field(init=False)
+    signals: Reel = field(init=False)
+    flowed: Reel = field(init=False)
     energies: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -172,8 +179,14 @@ class Tape:
         everyone = np.arange(len(self.slots.bundle) if self.energy else 0)
         self.members = inside(everyone)
         self.recorded = inside(self.recorded)
-        self._state = self.slots.state_indices(self.recorded)
-        self.frames = np.empty((count, len(self._state)))
+        state = self.slots.state_indices(self.recorded)
+        sizes = 3 * self.slots.masses[self.recorded]
+        self.frames = Reel(count, self.recorded, sizes, state)
+        asked = {} if self.pilot is None else self.pilot.outputs
+        some = [robot for robot in self.recorded.tolist() if robot in asked]
+        self.signals = Reel.of(count, {robot: np.arange(*asked[robot]) for robot in some})
+        some = [robot for robot in self.recorded.tolist() if robot in self.wearing]
+        self.flowed = Reel.of(count, {robot: flow_places(*self.wearing[robot]) for robot in some})
         self._lanes = self.slots.lane_indices(self.members, ENERGIES)
         self.energies = np.empty((count if self.energy else 0, len(self.members), ENERGIES))
         bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
@@ -205,8 +218,10 @@ class Tape:
 
     def _take(self, index: int) -> None:
         buffers = self.slice.buffers
-        if len(self._state):
-            self.frames[index] = buffers["seen_positions"][self._state]
+        self.frames.take(index, buffers["seen_positions"])
+        self.flowed.take(index, buffers["worn"])
+        if len(self.signals):
+            self.signals.take(index, self.pilot.heard())
         if self.energy:
             self.energies[index] = buffers["seen_energies"][self._lanes]
             if self.pilot is not None:
@@ -216,18 +231,20 @@ class Tape:
         """A tape of the first frames alone; they are complete once they are ``taken``."""
         short = copy.copy(self)
         short.frame_steps = self.frame_steps[:frames]
-        short.frames, short.energies = self.frames[:frames], self.energies[:frames].copy()
+        for name in ("frames", "signals", "flowed"):
+            setattr(short, name, getattr(self, name).cut_to(frames))
+        short.energies = self.energies[:frames].copy()
         return short
 
     def frames_by_robot(self) -> dict[int, np.ndarray]:
         """Frames (F, M, 3) of each recorded robot."""
-        sizes = 3 * self.slots.masses[self.recorded]
-        parts = np.split(self.frames, np.cumsum(sizes)[:-1], axis=1) if len(sizes) else []
         shape = (len(self.frame_steps), -1, 3)
-        return {
-            int(robot): np.ascontiguousarray(part).reshape(shape)
-            for robot, part in zip(self.recorded, parts, strict=True)
-        }
+        return {robot: flat.reshape(shape) for robot, flat in self.frames.by_robot().items()}
+
+
+def flow_places(place: np.ndarray, lane: int) -> np.ndarray:
+    """Where it is kept how far springs have flowed, from `Batch.wearing`."""
+    return 2 * (place - lane) + lane
 
 
 def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress=None) -> None:

@@ -16,6 +16,11 @@ The file is an uncompressed zip of NumPy arrays, readable with ``numpy.load``:
     At the end [m, m/s], shape (M of all robots together, 3), float64, robot by robot.
 ``frames/INDEX``
     Recorded positions of a robot [m], shape (F, M, 3), float64.
+``worn/INDEX``, ``flowed/INDEX``
+    Of a robot whose springs may break or yield: when they broke [s] and how far they had flowed in
+    the end [m], shape (2, S); and in each frame [m], shape (F, S).
+``signals/INDEX``, ``heard/INDEX``
+    Of a robot with controllers: their outputs in the end, and in each frame, shape (F, outputs).
 
 Nothing in a file is executed. Frames stay on the disk until they are asked for.
 """
@@ -45,6 +50,8 @@ __all__ = ["load_result", "save_result"]
 FORMAT = "warp_springs result"
 VERSION = 1
 _SUFFIXES = (".npz",)
+_BY_ROBOT = ("worn", "flowed", "signals", "heard")
+"""What is kept of some robots only: folders of a file, and private fields of a result."""
 _ZIP_HEADER = 30
 """Bytes before the name of an entry; the last four say how long the name and its extras are."""
 _READ_HEADER = {
@@ -78,10 +85,9 @@ def save_result(result: Result, path: str | os.PathLike[str]) -> Path:
             _write_states(file, name, getattr(result, name), header["masses"])
         for index in result.recorded:
             _write(file, f"frames/{index}", np.asarray(result.frames(index), np.float64))
-        for index, worn in result._worn.items():
-            _write(file, f"worn/{index}", worn)
-        for index, signals in result._signals.items():
-            _write(file, f"signals/{index}", signals)
+        for name in _BY_ROBOT:
+            for index, values in getattr(result, f"_{name}").items():
+                _write(file, f"{name}/{index}", values)
     return path
 
 
@@ -104,13 +110,18 @@ def load_result(path: str | os.PathLike[str]) -> Result:
             _positions=entries["positions"],
             _velocities=entries["velocities"],
             _frames={index: entries[f"frames/{index}"] for index in fields["recorded"]},
-            _worn={int(key[5:]): worn for key, worn in entries.items() if key[:5] == "worn/"},
-            _signals={int(k[8:]): s for k, s in entries.items() if k[:8] == "signals/"},
+            **{f"_{name}": _by_robot(entries, name) for name in _BY_ROBOT},
         )
     except OSError:
         raise
     except Exception as error:  # whatever a damaged file makes of its contents
         raise ValueError(f"{path}: this is no readable result file ({error})") from error
+
+
+def _by_robot(entries: dict[str, np.ndarray], name: str) -> dict[int, np.ndarray]:
+    """What the file holds of some robots, by their index."""
+    keys = [key.partition("/") for key in entries]
+    return {int(i): entries[f"{name}/{i}"] for kind, _, i in keys if kind == name}
 
 
 class _Rows:

@@ -7,7 +7,7 @@ import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -82,14 +82,14 @@ def write_mesh(
     return [_write_one(name, _mesh(one)) for name, one in zip(names, frames, strict=True)]
 
 
-class _Frame:
-    """A robot at one time."""
+class _Frame(NamedTuple):
+    """A robot at one time: its state, and its springs' rest lengths [m] and tensions [N]."""
 
-    def __init__(
-        self, body: Robot, time: float, positions: FloatArray, velocities: FloatArray | None
-    ) -> None:
-        self.body, self.time = body, time
-        self.positions, self.velocities = positions, velocities
+    body: Robot
+    positions: FloatArray
+    velocities: FloatArray | None
+    rest: FloatArray
+    tension: FloatArray
 
 
 class _Frames:
@@ -116,15 +116,18 @@ class _Frames:
         return len(self.times)
 
     def __iter__(self) -> Iterator[_Frame]:
-        if isinstance(self._source, Robot):
-            yield _Frame(self.body, 0.0, self.body.positions, self.body.velocities)
+        body, result, i = self.body, self._source, self._robot
+        if isinstance(result, Robot):
+            rest, tension = body.rest_length_at(0.0), body.tension(body.positions, 0.0)
+            yield _Frame(body, body.positions, body.velocities, rest, tension)
         elif self._index is None:
-            result, i = self._source, self._robot
-            yield _Frame(self.body, result.end_time, result.positions(i), result.velocities(i))
+            springs = result.rest_lengths(i), result.tension(i)
+            yield _Frame(body, result.positions(i), result.velocities(i), *springs)
         else:
-            frames = self._source.frames(self._robot)
-            for i, time in zip(self._index, self.times, strict=True):
-                yield _Frame(self.body, float(time), np.asarray(frames[i], np.float64), None)
+            for k in self._index:
+                rest, tension = result.rest_length_frames(i, [k]), result.tension_frames(i, [k])
+                positions = np.asarray(result.frames(i)[k], np.float64)
+                yield _Frame(body, positions, None, rest[0], tension[0])
 
 
 def _check(path: Path, suffix: str, frames: _Frames) -> None:
@@ -148,8 +151,7 @@ def _mesh(frame: _Frame) -> meshio.Mesh:
     import meshio
 
     body = frame.body
-    tension = body.tension(frame.positions, frame.time)
-    rest = body.rest_length_at(frame.time)
+    tension, rest = frame.tension, frame.rest
     with np.errstate(divide="ignore", invalid="ignore"):
         stretch = np.where(rest > 0.0, spring_lengths(frame.positions, body.springs) / rest, 1.0)
     lines = {

@@ -18,8 +18,9 @@ from pxr import Sdf, Usd, UsdGeom, Vt  # noqa: TID253
 from warp_springs.io.usd.geometry import Detail
 from warp_springs.io.usd.layout import Paint
 from warp_springs.io.usd.poses import quaternions, rigid_fit
-from warp_springs.io.usd.stage import Looks, vec3f
+from warp_springs.io.usd.stage import Looks, constant_color, indexed_color, vec3f
 from warp_springs.robot import Robot
+from warp_springs.view import appearance
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -152,10 +153,20 @@ class Body(ABC):
 
     def _paint_on(self, prim: UsdGeom.Gprim) -> None:
         """Give bars their colours, one for each face or curve."""
-        primvar = prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.uniform)
-        primvar.Set(vec3f(self._paint.palette))
-        primvar.SetIndices(Vt.IntArray.FromNumpy(self._spread(self._paint.rest)))
+        rows = self._spread(self._paint.rest)
+        primvar = indexed_color(prim, UsdGeom.Tokens.uniform, self._paint.palette, rows)
         self._colors = primvar.GetIndicesAttr()
+
+    def _paint_masses(
+        self, prim: UsdGeom.Gprim, interpolation: str, masses: IntArray
+    ) -> NDArray[np.bool_]:
+        """Give elements that stand for masses their colours; returns which stand for held ones."""
+        held = np.isin(masses, self._robot.elements.bonds.masses)
+        if held.any():
+            indexed_color(prim, interpolation, [appearance.MASS, appearance.HELD], held)
+        else:
+            constant_color(prim, appearance.MASS)
+        return held
 
     def _child(self, parent: Sdf.Path, name: str) -> Sdf.Path:
         """A path whose last name is unique in the file: some viewers animate by name alone."""

@@ -20,9 +20,10 @@ from warp_springs.io.usd.layout import (
     frame_rate,
     paints,
     placed,
-    surface_only,
+    surface_springs,
     track,
     unique_names,
+    with_springs,
 )
 from warp_springs.io.usd.notes import facts, provenance, usd_dict
 from warp_springs.io.usd.poses import bends
@@ -65,7 +66,8 @@ class _Drawn(NamedTuple):
     """A robot to be written."""
 
     item: Track
-    robot: Robot  # with the springs that are drawn
+    kept: np.ndarray  # the springs that are drawn
+    robot: Robot  # with these alone
     geometry: str
     paint: Paint
     offset: np.ndarray
@@ -143,12 +145,14 @@ def export_usd(
         for index, data in (custom_data or {}).items()
     }
     tracks = [track(result, index) for index in indices]
-    shown = [_shown(item.robot, springs) for item in tracks]
+    kept = [_kept(item.robot, springs) for item in tracks]
+    shown = [with_springs(item.robot, some) for item, some in zip(tracks, kept, strict=True)]
     on_grid = grid and len(tracks) > 1
     drawn = [
         _Drawn(*each)
         for each in zip(
             tracks,
+            kept,
             shown,
             [_chosen_geometry(item.robot, geometry) for item in tracks],
             paints(shown, color),
@@ -230,7 +234,7 @@ def _write_motion(
     radii = (item.bar, item.ball)
     most = max(1, min(_SCALE_FRAMES, _SCALE_SPRINGS // max(each.robot.n_springs, 1)))
     sample = _spread(len(frames), most)
-    scale = appearance.stress_scale(_tension(each, frames, sample))
+    scale = appearance.stress_scale(_tension(result, each, sample))
     bent = each.geometry != "points" and _bends(each.robot, frames[item.source[sample]])
     far = bool(np.abs(item.box + each.offset).max() > _NEAR)
     body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail, bent, far)
@@ -242,7 +246,7 @@ def _write_motion(
         positions = frames[item.source[block]].astype(np.float64) + each.offset
         colors = None
         if each.paint.shows_stress:
-            colors = appearance.stress_index(_tension(each, frames, block), scale)
+            colors = appearance.stress_index(_tension(result, each, block), scale)
         body.write(first, positions, colors)
         saver.wrote(len(block) * body.bytes_a_frame, len(block) / len(frames))
     body.finish()
@@ -258,11 +262,10 @@ def _body(geometry: str) -> type[Body]:
     return {"skel": SkelBody, "points": PointsBody, "mesh": MeshBody}[geometry]
 
 
-def _tension(each: _Drawn, frames: np.ndarray, shown: np.ndarray) -> np.ndarray:
+def _tension(result: Result, each: _Drawn, shown: np.ndarray) -> np.ndarray:
     """Tensions [N] in the frames shown, (len(shown), S); an absurd stiffness may overflow."""
-    item = each.item
     with np.errstate(over="ignore"):
-        return each.robot.tension(frames[item.source[shown]], item.times[shown])
+        return result.tension_frames(each.item.index, each.item.source[shown])[:, each.kept]
 
 
 class _Saver:
@@ -318,11 +321,11 @@ def _solid_boxes(result: Result) -> list[np.ndarray]:
     return [np.stack([points.min(axis=0), points.max(axis=0)]) for points in meshes]
 
 
-def _shown(robot: Robot, springs: Springs) -> Robot:
-    """The robot with the springs that are drawn."""
+def _kept(robot: Robot, springs: Springs) -> np.ndarray:
+    """The springs that are drawn."""
     if springs == "surface" or (springs == "auto" and robot.n_masses > MOST_JOINTS):
-        return surface_only(robot)
-    return robot
+        return surface_springs(robot)
+    return np.arange(robot.n_springs)
 
 
 def _chosen_geometry(robot: Robot, geometry: Geometry) -> str:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_springs.body.elements import PER_SPRING, Elements
-from warp_springs.body.fields import FIELDS, freeze
+from warp_springs.body.elements import Elements
+from warp_springs.body.fields import FIELDS
 from warp_springs.robot import Robot
 from warp_springs.view import appearance
 from warp_springs.view.palette import material_palette
@@ -134,8 +134,7 @@ def track(result: Result, index: int) -> Track:
     source = np.maximum(source, good.argmax())
     bar, ball = appearance.drawn_radii(robot.lengths)
     reach = max(bar, ball)
-    # A robot that was stopped no longer moves, and neither does its actuation.
-    times = np.fmin(np.asarray(result.times, dtype=np.float64), result.status_time[index])[source]
+    times = result.clock(index)[source]
     low, high = low[source] - reach, high[source] + reach
     return Track(index, robot, times, source, low, high, ball, bar)
 
@@ -201,15 +200,21 @@ def paints(robots: Sequence[Robot], color: str) -> list[Paint]:
     return [Paint(palette, label.astype(np.int32), kinds) for label in labels]
 
 
-def surface_only(robot: Robot) -> Robot:
-    """The robot without the springs that end inside it; unchanged if it has no faces."""
+def surface_springs(robot: Robot) -> NDArray[np.intp]:
+    """The springs that do not end inside the robot; all of them if it has no faces."""
     outside = np.zeros(robot.n_masses, bool)
     outside[robot.faces] = True
-    kept = np.flatnonzero(outside[robot.springs].all(axis=1))
-    if not len(robot.faces) or len(kept) == robot.n_springs:
+    if not len(robot.faces):
+        outside[:] = True
+    return np.flatnonzero(outside[robot.springs].all(axis=1))
+
+
+def with_springs(robot: Robot, kept: NDArray[np.intp]) -> Robot:
+    """The robot with some of its springs, as it looks: special springs are not kept as such."""
+    if len(kept) == robot.n_springs:
         return robot
     fields = {name: getattr(robot, name)[kept] for name, f in FIELDS.items() if f.per == "spring"}
-    return robot.replace(**fields, elements=_elements_of(robot.elements, kept))
+    return robot.replace(**fields, elements=Elements(bonds=robot.elements.bonds))
 
 
 def _bounds(frames: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -218,16 +223,6 @@ def _bounds(frames: FloatArray) -> tuple[FloatArray, FloatArray]:
     pieces = [frames[first : first + step] for first in range(0, len(frames), step)]
     low = np.concatenate([piece.min(axis=1) for piece in pieces])
     return low, np.concatenate([piece.max(axis=1) for piece in pieces])
-
-
-def _elements_of(elements: Elements, springs: NDArray[np.intp]) -> Elements:
-    """The elements of some springs of a robot."""
-    arrays = elements.arrays.items()
-    changes: dict[str, Any] = {n: freeze(a[springs]) for n, a in arrays if n in PER_SPRING}
-    if (table := elements.timetable) is not None:
-        rows = {n: freeze(getattr(table, n)[springs]) for n in ("factors", "offsets")}
-        changes["timetable"] = replace(table, **rows)
-    return elements.replace(**changes, controllers=())  # what is drawn needs no brain
 
 
 def _room(tracks: Sequence[Track], start: FloatArray, solids: Sequence[FloatArray]) -> float:

@@ -24,7 +24,7 @@ _POINT_BYTES = 12
 
 
 class _Piece(NamedTuple):
-    """A mesh of a robot and how it looks; bars have the colours of their springs instead."""
+    """A mesh of a robot and how it looks; without a colour where its parts have their own."""
 
     name: str
     part: Part
@@ -37,9 +37,7 @@ class Meshes(Body):
 
     def _pieces(self) -> Iterator[_Piece]:
         robot, rest, looks = self._robot, self._rest, self._looks
-        yield _Piece(
-            "masses", balls(rest, self._ball, self._detail.cuts), looks.mass, appearance.MASS
-        )
+        yield _Piece("masses", balls(rest, self._ball, self._detail.cuts), looks.mass, None)
         if len(robot.faces):
             yield _Piece("skin", skin(rest, robot.faces), looks.skin, appearance.SKIN)
         if robot.n_springs:
@@ -54,10 +52,20 @@ class Meshes(Body):
             bind(mesh, material)
             if color is not None:
                 constant_color(mesh, color)
+            elif name == "masses":
+                self._paint_balls(mesh, part)
             else:
                 self._paint_on(mesh)
                 add_subsets(mesh, self._subsets())
             yield mesh, part
+
+    def _paint_balls(self, mesh: UsdGeom.Mesh, part: Part) -> None:
+        """Balls of held masses differ, in colour and in material."""
+        masses = part.masses[part.faces[:, 0]]
+        held = self._paint_masses(mesh, UsdGeom.Tokens.uniform, masses)
+        if held.any():
+            kinds = {"Free": (~held, self._looks.mass), "Held": (held, self._looks.held)}
+            add_subsets(mesh, {n: (np.flatnonzero(w), m) for n, (w, m) in kinds.items() if w.any()})
 
     def _subsets(self) -> dict[str, tuple[IntArray, UsdShade.Material]]:
         """The faces of the bars of each kind, which viewers that know no indexed colours need."""

@@ -39,7 +39,7 @@ class PointsBody(Body):
         dots.CreateWidthsAttr(Vt.FloatArray([2.0 * self._ball]))
         dots.SetWidthsInterpolation(UsdGeom.Tokens.constant)
         dots.CreateExtentAttr(self._rest_extent())
-        constant_color(dots, appearance.MASS)
+        self._paint_masses(dots, UsdGeom.Tokens.vertex, masses)
         bind(dots, looks.mass)
 
     @property

@@ -51,6 +51,7 @@ class Looks(NamedTuple):
 
     bars: UsdShade.Material
     mass: UsdShade.Material
+    held: UsdShade.Material
     skin: UsdShade.Material
     ground_light: UsdShade.Material
     ground_dark: UsdShade.Material
@@ -87,6 +88,7 @@ def add_looks(stage: Usd.Stage, kinds: Mapping[str, Rgb]) -> Looks:
     looks = Looks(
         bars=_material(stage, "Bars", appearance.NEUTRAL, 0.5),
         mass=_material(stage, "Mass", appearance.MASS, 0.35),
+        held=_material(stage, "Held", appearance.HELD, 0.35),
         skin=_material(stage, "Skin", appearance.SKIN, 0.6),
         ground_light=_material(stage, "GroundLight", appearance.GROUND_LIGHT, 0.9),
         ground_dark=_material(stage, "GroundDark", appearance.GROUND_DARK, 0.9),
@@ -139,6 +141,16 @@ def bind(prim: UsdGeom.Imageable | UsdGeom.Subset, material: UsdShade.Material) 
 def constant_color(prim: UsdGeom.Gprim, color: ArrayLike) -> None:
     """One display colour, linear RGB (3,), for viewers that ignore materials."""
     prim.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(vec3f([color]))
+
+
+def indexed_color(
+    prim: UsdGeom.Gprim, interpolation: str, palette: ArrayLike, rows: ArrayLike
+) -> UsdGeom.Primvar:
+    """Display colours from a table, linear RGB (K, 3): one of its rows for each element."""
+    primvar = prim.CreateDisplayColorPrimvar(interpolation)
+    primvar.Set(vec3f(palette))
+    primvar.SetIndices(ints(rows))
+    return primvar
 
 
 def vec3f(rows: ArrayLike) -> Vt.Vec3fArray:

@@ -20,7 +20,6 @@ from warp_springs.view.pictures.solids import obstacle_mesh
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
-    from warp_springs.robot import Robot
 
 STEPS_PER_BAR = 64
 """Steps of the grid that positions are rounded to, in a bar's radius."""
@@ -137,7 +136,7 @@ def _motion(result: Result, item: Track, offset: NDArray, block: Block) -> dict[
     steps = np.rint((frames - center) / quantum).astype(np.int64)
     motion = _changes(steps.reshape(len(frames), -1), np.uint16)
     planes = np.stack([motion & 0xFF, motion >> 8])  # alike bytes side by side compress better
-    tension = robot.tension(frames, item.times)
+    tension = result.tension_frames(item.index)[item.source]
     scale = appearance.stress_scale(tension)
     middles = np.einsum("fmi,m->fi", frames, robot.masses) / robot.mass + offset
     return {
@@ -151,15 +150,17 @@ def _motion(result: Result, item: Track, offset: NDArray, block: Block) -> dict[
         "reach": {"low": (low + offset).tolist(), "high": (high + offset).tolist()},
         "height": block.add(middles[:, 2] - offset[2], "f4"),
         "speed": block.add(_speed(middles, result.times), "f4"),
-        **_actuation(robot, item.times, block),
+        **_actuation(result, item, block),
     }
 
 
-def _actuation(robot: Robot, times: NDArray, block: Block) -> dict[str, Any]:
+def _actuation(result: Result, item: Track, block: Block) -> dict[str, Any]:
     """By how much springs are told to be longer or shorter, as a share of their rest length."""
-    rest = robot.rest_length
-    share = np.divide(robot.rest_length_at(times) - rest, rest, where=rest > 0.0,
-                      out=np.zeros((len(times), len(rest))))  # fmt: skip
+    rest = item.robot.rest_length
+    told = item.robot.rest_length_at(item.times) - rest
+    asked = result.rest_length_change(item.index, item.source, yielded=False)
+    told = told if asked is None else told + asked
+    share = np.divide(told, rest, where=rest > 0.0, out=np.zeros_like(told))
     scale = float(np.abs(share).max(initial=0.0))
     if scale < _NO_ACTUATION:
         return {"actuation": None, "actuationScale": 0.0}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,20 +11,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_springs.io.usd.layout import track
 from warp_springs.robot import Robot
 from warp_springs.view import appearance
 from warp_springs.view.look import Look, checked_frame
 from warp_springs.view.palette import material_palette
+from warp_springs.view.pictures.painting import (
+    Actuation,
+    Motion,
+    Paint,
+    Stress,
+    motion_at_end,
+    recorded_motion,
+)
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
 
 FloatArray = NDArray[np.float64]
-Paint = Callable[[FloatArray, float], NDArray[np.float32]]
-"""Colours of the bars, (S, 3) linear RGB, for positions (M, 3) m at a time in s."""
-
-_FRAMES_FOR_SCALE = 64
 _CALM = 0.5
 """Longest time in s over which the way of a robot is smoothed."""
 
@@ -36,10 +39,8 @@ class Actor:
     Attributes:
         body: The robot.
         times: Times of the frames [s], (F,).
-        clock: The same, but standing still from when the robot was stopped [s], (F,).
         frames: Positions [m], (F, M, 3), all finite.
         paint: Colours of its bars.
-        scale: What is shown in full colour: a force [N] or a strain; None: colours have no scale.
         bar: Radius of its bars [m].
         ball: Radius of its spheres [m].
         broken: When each of its springs broke [s], (S,); NaN for those that hold.
@@ -49,15 +50,18 @@ class Actor:
 
     body: Robot
     times: FloatArray
-    clock: FloatArray
     frames: FloatArray
     paint: Paint
-    scale: float | None
     bar: float
     ball: float
     broken: FloatArray
     calm: float
     offset: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def scale(self) -> float | None:
+        """What is shown in full colour: a force [N] or a strain; None: colours have no scale."""
+        return self.paint.scale
 
     @property
     def low(self) -> FloatArray:
@@ -97,8 +101,7 @@ class Actor:
 
     def colors(self, time: float) -> NDArray[np.float32]:
         """Colours of its bars at any time, (S, 3) linear RGB."""
-        bare = between(self.times, self.frames, time)
-        return self.paint(bare, float(np.interp(time, self.times, self.clock)))
+        return self.paint(between(self.times, self.frames, time), time)
 
 
 def _calm_way(times: FloatArray, way: FloatArray, width: float) -> FloatArray:
@@ -170,51 +173,31 @@ def _actor(
     fixed: NDArray[np.float32] | None,
 ) -> Actor:
     body = result.robots[index]
-    known = None
-    if index in result.recorded and len(result.times):
-        shown = track(result, index)
-        known = np.asarray(result.frames(index))[shown.source], shown.times
-    if frame is None and not film:
-        times = np.array([result.end_time])
-        frames, clock = result.positions(index)[None], times
-    elif film:
-        (frames, clock), times = known, np.asarray(result.times)
+    recorded = index in result.recorded and len(result.times)
+    known = recorded_motion(result, index) if recorded else None
+    if film:
+        motion = known
+    elif frame is None:
+        motion = motion_at_end(result, index)
     else:
         chosen = checked_frame(frame, len(result.times))
-        one = slice(chosen, chosen + 1)
-        frames, clock, times = known[0][one], known[1][one], np.asarray(result.times)[one]
-    if not np.isfinite(frames).all():
+        motion = known.part(slice(chosen, chosen + 1))
+    if not np.isfinite(motion.frames).all():
         raise ValueError(f"robot {index}: its positions are not finite, so it cannot be shown")
-    bar, ball = appearance.drawn_radii(body.lengths)
-    paint, scale = _paint(body, look.color, *(known or (frames, clock)), fixed)
+    bar, ball = (look.thickness * radius for radius in appearance.drawn_radii(body.lengths))
+    paint = _paint(body, look.color, motion, known or motion, fixed)
     touching = result.scene.ground is not None or bool(result.scene.obstacles)
     calm = _CALM if touching else 0.0
-    thick = look.thickness
-    broken = result.broken(index)
-    return Actor(body, times, clock, frames, paint, scale, bar * thick, ball * thick, broken, calm)
+    return Actor(body, motion.times, motion.frames, paint, bar, ball, result.broken(index), calm)
 
 
 def _paint(
-    body: Robot,
-    color: str,
-    frames: FloatArray,
-    clock: FloatArray,
-    fixed: NDArray[np.float32] | None,
-) -> tuple[Paint, float | None]:
-    """Return the colours of a robot's bars, and their scale, which follows from all its frames."""
-    step = max(1, len(clock) // _FRAMES_FOR_SCALE)
+    body: Robot, color: str, motion: Motion, known: Motion, fixed: NDArray[np.float32] | None
+) -> Paint:
+    """The colours of a robot's bars; their scale follows from all its frames."""
     if color == "stress":
-        scale = appearance.stress_scale(body.tension(frames[::step], clock[::step]))
-        return (lambda p, t: appearance.stress_color(body.tension(p, t), scale)), scale
-    if color == "actuation" and body.is_actuated:
-        largest = max(float(np.abs(_strain(body, clock[::step])).max()), 1e-9)
-        return (lambda _, t: appearance.actuation_color(_strain(body, t), largest)), largest
-    if fixed is None:
-        fixed = np.tile(np.float32(appearance.NEUTRAL), (body.n_springs, 1))
-    return (lambda *_: fixed), None
-
-
-def _strain(body: Robot, time: float | FloatArray) -> FloatArray:
-    """By which share of it muscles change their rest length, (S,) or (F, S)."""
-    mean = np.maximum(body.rest_length, 1e-12)
-    return body.rest_length_at(time) / mean - 1.0
+        return Stress(body, motion, known)
+    if color == "actuation":
+        return Actuation(body, motion, known)
+    plain = np.tile(np.float32(appearance.NEUTRAL), (body.n_springs, 1))
+    return Paint(plain if fixed is None else fixed)

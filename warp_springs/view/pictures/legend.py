@@ -27,7 +27,7 @@ def rows_of(actors: Sequence[Actor], look: Look) -> list[Row]:
         much = "" if alone is None else f": {alone:.3g} N or more"
         words = (f"stretched{much}", "relaxed", f"compressed{much}")
         return _three(appearance.TENSION, appearance.COMPRESSION, words)
-    if look.color == "actuation" and any(a.body.is_actuated for a in actors):
+    if look.color == "actuation" and any(a.scale is not None for a in actors):
         much = "" if alone is None else f" by {100 * alone:.3g} %"
         words = (f"told to be longer{much}", "as on average", f"told to be shorter{much}")
         return _three(appearance.LONGER, appearance.SHORTER, words)

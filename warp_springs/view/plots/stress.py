@@ -35,8 +35,7 @@ def stress_histogram(ax: Axes, result: Result, robot: int = 0, *, bins: int = 61
     style.index_of(result, robot)
     if bins < 1:
         raise ValueError(f"bins: got {bins!r}, expected at least 1")
-    body = result.robots[robot]
-    force = body.tension(result.frames(robot), result.times)
+    force = result.tension_frames(robot)
     force = force[np.isfinite(force)]
     if force.size == 0:
         raise ValueError(f"robot {robot}: it has no spring that carries a force")
