@@ -97,24 +97,40 @@ def _validate(robots: Sequence[ws.Robot]) -> None:
 
 
 def genomes(options: argparse.Namespace) -> None:
-    """Random genomes of every encoding, crossed and mutated, each stepped 100 times."""
-    share = max(1, options.genomes // len(ENCODINGS))
-    for name, cls in ENCODINGS.items():
+    """Random genomes of every encoding, crossed and mutated, each stepped 100 times.
+
+    Whatever comes of a genome, the run goes on: a robot that is well is where numbers are, and the
+    others are counted by what stopped them.
+    """
+    share = -(-options.genomes // len(ENCODINGS))
+    for name in options.encodings or ENCODINGS:
+        cls = ENCODINGS[name]
         body = ws.shapes.lattice(2, 1, 1) if cls.needs_body else None
         encoding, started = cls(body, cls.Settings()), time.perf_counter()
-        counts: dict[str, int] = {}
+        counts, slowest = np.zeros(len(ws.Status), np.int64), 0.0
         for first in range(0, share, BATCH):
+            begun = time.perf_counter()
             rng = np.random.Generator(np.random.Philox([7, first]))
             n = min(BATCH, share - first)
             found = encoding.random(n, rng)
             found = encoding.cross(found, encoding.take(found, rng.permutation(n)), rng)
             robots = encoding.express(encoding.mutate(found, rng))
-            result = ws.Simulation(robots, SCENE, dt=DT, precision="float32").run(100 * DT)
-            for status in np.asarray(result.status).tolist():
-                key = ws.Status(status).name
-                counts[key] = counts.get(key, 0) + 1
-        seconds = time.perf_counter() - started
-        _say(what="genomes", encoding=name, genomes=share, seconds=seconds, statuses=counts)
+            simulation = ws.Simulation(
+                robots, SCENE, dt=DT, precision="float32", threads=options.threads
+            )
+            result = simulation.run(100 * DT)
+            status = np.asarray(result.status)
+            assert np.isfinite(result.center_of_mass[status == 0]).all(), (name, first)
+            counts += np.bincount(status, minlength=len(counts))
+            slowest = max(slowest, time.perf_counter() - begun)
+        _say(
+            what="genomes",
+            encoding=name,
+            genomes=int(counts.sum()),
+            seconds=time.perf_counter() - started,
+            slowest_thousand_s=slowest,
+            statuses={ws.Status(i).name: int(n) for i, n in enumerate(counts) if n},
+        )
 
 
 def search(options: argparse.Namespace) -> None:
@@ -166,6 +182,8 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=0.1, help="simulated at a time [s]")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--genomes", type=int, default=1_000_000, help="over all encodings")
+    parser.add_argument("--encodings", nargs="*", default=(), help="only these; their share each")
+    parser.add_argument("--threads", type=int, default=1, help="that step genomes")
     parser.add_argument("--presets", nargs="+", default=["creature", "critter", "walker", "cube"])
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--population", type=int, default=128)

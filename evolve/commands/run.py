@@ -44,8 +44,8 @@ class Run:
     """direct, regions, harmonics, fourier, expression, neural or cppn, with what it has in common
     with the encoding of the preset."""
     optimizer: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
-    """genetic, cma, age_fitness, crowding, steady_state, nsga2, map_elites, hill_climber or random,
-    with its own defaults."""
+    """genetic, cma, age_fitness, crowding, steady_state, nsga2, map_elites, novelty, speciation,
+    learning, coevolution, hill_climber or random, with its own defaults."""
     threads: Whole = None
     """Processor cores to use, otherwise all. Changes nothing but the time."""
     devices: Annotated[tuple[str, ...], arg(metavar="DEVICE ...", help_behavior_hint="")] = ()

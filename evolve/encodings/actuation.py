@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from evolve.encodings.base import EncodingSettings, Interval
+from evolve.encodings.base import EncodingSettings, Genomes, Interval
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -79,6 +79,10 @@ class FixedBody:
         low, high = body.bounds
         half = max(float((high - low).max()) / 2.0, np.finfo(float).tiny)
         self.places = (self.middles - (low + high) / 2.0) / half
+
+    def tune(self, genomes: Genomes, rng: np.random.Generator) -> Genomes:
+        """Make one changed copy of every genome: none of them says anything about the body."""
+        return self.mutate(genomes, rng)
 
     def actuated(
         self,

@@ -66,6 +66,9 @@ class Encoding(Protocol):
     def mutate(self, genomes: Genomes, rng: np.random.Generator) -> Genomes:
         """Make one changed copy of every genome."""
 
+    def tune(self, genomes: Genomes, rng: np.random.Generator) -> Genomes:
+        """Make one copy of every genome that has the same body, but moves otherwise."""
+
     def cross(self, a: Genomes, b: Genomes, rng: np.random.Generator) -> Genomes:
         """Make one child of every pair a[i], b[i]."""
 

@@ -23,6 +23,8 @@ class CppnBodySettings(NetworkSettings, VoxelBodySettings):
     type: Literal["cppn_body"] = "cppn_body"
     add_node: float = Field(0.15, ge=0.0, le=1.0)
     """Share of the mutations that split a connection by a new node."""
+    body_rate: float = Field(1.0, ge=0.0, le=1.0)
+    """Share of the mutations that may change the body; the others leave it time to learn."""
     mutation_rate: float = Field(0.3, gt=0.0, le=1.0)
     """Share of the weights that a mutation changes, on average."""
     mutation_step: float = Field(0.1, gt=0.0)
@@ -55,10 +57,20 @@ class CppnBodyEncoding(VoxelBody, ArrayGenomes):
         return self.networks.random(n, rng)
 
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Change weights, functions or the structure of every network."""
+        """Change weights, functions or the structure of every network, or what it says of phases
+        and materials alone."""
         settings = self.settings
         chances = (settings.add_node, settings.add_connection, settings.drop_connection)
-        return self.networks.mutate(genomes, rng, *chances)
+        mutants = self.networks.mutate(genomes, rng, *chances)
+        if settings.body_rate >= 1.0:
+            return mutants
+        bodies = rng.random(len(genomes)) < settings.body_rate
+        return np.where(bodies[:, None], mutants, self.tune(genomes, rng))
+
+    def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Change what flows into the outputs other than presence: weights, functions, at times
+        which connections there are."""
+        return self.networks.tuned(genomes, rng, first=1, rate=self.settings.add_connection)
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Take every connection, and every node's function, from a[i] or from b[i]."""

@@ -26,6 +26,9 @@ RULE, PLACE = 0, 1
 STEP = 2 + len(GENES)
 SHIFTED = tuple(2 + GENES.index(name) for name in ("size", "stiffness"))
 """Genes that are seen in every part."""
+STIFFNESS = 2 + GENES.index("stiffness")
+BEHAVIOUR = (*PHASES, "swing", "stiffness")
+"""Genes that leave the shape of a part as it is."""
 PARTS_PER_CELL = 2
 """Parts that a tree may have for each cell of a body: some build none, some build several."""
 
@@ -84,6 +87,7 @@ class GrammarEncoding(CellGenes):
         self.genome_shape = (settings.most_steps, STEP)
         self.circular = np.array([False, False, *(name in PHASES for name in GENES)])
         self._named = np.arange(STEP) <= PLACE
+        self._behaviour = np.array([False, False, *(name in BEHAVIOUR for name in GENES)])
 
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change some genes, a part that is there at least; at times insert or delete a step."""
@@ -95,6 +99,17 @@ class GrammarEncoding(CellGenes):
                 genome[step, gene] += self.settings.mutation_step * rng.standard_normal()
             if rng.random() < 0.25:
                 _moved_on(genome, int(rng.integers(max(used, 1))), rng)
+            mutants[row] = folded(genome, self.circular)
+        return mutants
+
+    def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Change when and how far parts move and how stiff they are, two that are there too."""
+        mutants = self.shifted(genomes, rng, self._named)
+        mutants = np.where(self._behaviour, mutants, genomes)
+        for row, genome in enumerate(mutants):
+            _, used = self.derivation(genome)
+            for step in (0, rng.integers(max(used, 1))):
+                genome[step, STIFFNESS] += self.settings.mutation_step * rng.standard_normal()
             mutants[row] = folded(genome, self.circular)
         return mutants
 

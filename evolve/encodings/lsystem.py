@@ -40,6 +40,8 @@ class LsystemSettings(CellSettings):
     type: Literal["lsystem"] = "lsystem"
     rule_length: int = Field(6, ge=1, le=32)
     """Modules of a right side, at most."""
+    body_rate: float = Field(1.0, ge=0.0, le=1.0)
+    """Share of the mutations that may change the body; the others leave it time to learn."""
     most_steps: int = Field(4, ge=1, le=12)
     """Times that all symbols are replaced, at most; a gene says how often."""
 
@@ -67,6 +69,7 @@ class LsystemEncoding(CellGenes):
         in_rule = genes < self._ends[0]
         self._named = in_rule & (genes % MODULE == 0)
         in_tissue = ~in_rule & (genes < self._ends[1])
+        self._behaviour = in_tissue | (in_rule & (genes % MODULE == 2))
         phases = in_tissue & ((genes - self._ends[0]) % TISSUE == PHASE)
         self.circular = phases | (in_rule & (genes % MODULE == 2))
 
@@ -84,17 +87,32 @@ class LsystemEncoding(CellGenes):
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change some genes, a tissue that the body has at least; at times insert or delete."""
         mutants = self.shifted(genomes, rng, self._named)
+        bodies = rng.random(len(genomes)) < self.settings.body_rate
         for row, genome in enumerate(genomes):
-            used = [m.symbol for m in self.string(genome) if m.symbol in NAMES][:3] or ["A"]
-            # Only muscles have a phase, and only the first cell is sure to fit.
-            some = NAMES.index(used[rng.integers(len(used))]), NAMES.index(used[0])
-            gene = self._ends[0] + np.array(some) * TISSUE + [PHASE, STIFFNESS]
-            shift = 0.5 * self.settings.mutation_step * rng.standard_normal(2)
-            mutants[row, gene] = folded(mutants[row, gene] + shift, np.array([True, False]))
-            if rng.random() < 0.3:
+            if not bodies[row]:
+                mutants[row] = np.where(self._behaviour, mutants[row], genome)
+            self._retuned(mutants[row], genome, rng)
+            if bodies[row] and rng.random() < 0.3:
                 rules = mutants[row, : self._ends[0]].reshape(self._rules)
                 self._moved_on(rules[rng.integers(len(rules)), rng.integers(ALTERNATIVES)], rng)
         return mutants
+
+    def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Change tissues, one that the body has at least, and the phases of cells."""
+        mutants = self.shifted(genomes, rng, self._named)
+        mutants = np.where(self._behaviour, mutants, genomes)
+        for mutant, genome in zip(mutants, genomes, strict=True):
+            self._retuned(mutant, genome, rng)
+        return mutants
+
+    def _retuned(self, mutant: np.ndarray, genome: np.ndarray, rng: np.random.Generator) -> None:
+        """Shift phase and stiffness of tissues that the body of a genome has, in place."""
+        used = [m.symbol for m in self.string(genome) if m.symbol in NAMES][:3] or ["A"]
+        # Only muscles have a phase, and only the first cell is sure to fit.
+        some = NAMES.index(used[rng.integers(len(used))]), NAMES.index(used[0])
+        gene = self._ends[0] + np.array(some) * TISSUE + [PHASE, STIFFNESS]
+        shift = 0.5 * self.settings.mutation_step * rng.standard_normal(2)
+        mutant[gene] = folded(mutant[gene] + shift, np.array([True, False]))
 
     def _moved_on(self, modules: np.ndarray, rng: np.random.Generator) -> None:
         """Insert a module into a right side, (L, 4), in place; or delete one."""

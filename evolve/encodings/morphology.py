@@ -77,11 +77,15 @@ class MorphologyEncoding(EvolvingBody, ListGenomes):
 
     def mutate(self, genomes: Sequence[Plan], rng: np.random.Generator) -> list[Plan]:
         """Apply a few operators to every body, or to its springs alone."""
-        return [self._mutated(genome, rng) for genome in genomes]
+        return [self._mutated(genome, rng, self.settings.body_rate) for genome in genomes]
 
-    def _mutated(self, plan: Plan, rng: np.random.Generator) -> Plan:
+    def tune(self, genomes: Sequence[Plan], rng: np.random.Generator) -> list[Plan]:
+        """Apply a few operators to the springs of every body."""
+        return [self._mutated(genome, rng, body_rate=0.0) for genome in genomes]
+
+    def _mutated(self, plan: Plan, rng: np.random.Generator, body_rate: float) -> Plan:
         changes = rng.integers(1, self.settings.changes + 1)
-        if rng.random() < self.settings.body_rate:
+        if rng.random() < body_rate:
             plan, changes = varied(plan, BODY, self._fits, rng), changes - 1
         for _ in range(changes):
             plan = varied(plan, CONTROL, self._fits, rng)

@@ -150,6 +150,32 @@ class Networks:
         functions[node] = rng.random()
         return True
 
+    def tuned(
+        self, genomes: np.ndarray, rng: np.random.Generator, first: int, rate: float
+    ) -> np.ndarray:
+        """Change what the outputs from the `first` on make of all nodes; the others stay.
+
+        Args:
+            genomes: Shape (n, D).
+            rng: Where chance comes from.
+            first: Outputs before this one stay as they are.
+            rate: Share of the networks in which a connection appears or vanishes, too.
+        """
+        weights, exists, functions = self._genes(genomes)
+        late = self.hidden + first
+        for row in np.flatnonzero(rng.random(len(genomes)) < rate):
+            there = np.flatnonzero((self.allowed & self._live(exists[row]))[late:])
+            place = there[rng.integers(len(there))]
+            exists[row, late:].flat[place] ^= True
+        rows = np.arange(len(genomes))
+        before = [weights[:, :late].copy(), functions[:, :late].copy()]
+        # Only connections into late outputs are there to be shifted.
+        some = exists.copy()
+        some[:, :late] = False
+        self._shift(weights, some, functions, rows, rng)
+        weights[:, :late], functions[:, :late] = before
+        return self._joined(weights, exists, functions)
+
     def _shift(self, weights, exists, functions, rows, rng: np.random.Generator) -> None:
         """Shift some weights of some networks, and at times change a function."""
         if not len(rows):

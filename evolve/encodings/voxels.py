@@ -133,13 +133,32 @@ class VoxelsEncoding(VoxelBody, ArrayGenomes):
         return genomes
 
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Change material and phase of some voxels of every body; add or remove some, at times.
+        """Change material and phase of some voxels of every body; add or remove some, at times."""
+        rate, rows = self.settings.mutation_rate, np.arange(len(genomes))
+        masks = self.masks(genomes[:, :, PRESENCE] - 0.5)
+        changed = self._tuned(genomes, masks, rng)
+        # What may come or go: the voxels of the body and those beside it.
+        shapes = rng.random(len(rows)) < self.settings.body_rate
+        near = masks | self.lattice.beside(masks)
+        flips = near & (rng.random(near.shape) < 0.5 * rate)
+        flips[rows, _one_of(near, rng)] = True
+        flips &= shapes[:, None]
+        changed[:, :, PRESENCE][flips] = 1.0 - changed[:, :, PRESENCE][flips]
+        return changed
+
+    def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Change material and phase of some voxels of every body."""
+        return self._tuned(genomes, self.masks(genomes[:, :, PRESENCE] - 0.5), rng)
+
+    def _tuned(
+        self, genomes: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """Change material and phase of some voxels of the bodies that masks (n, V) show.
 
         Genes of absent voxels and phases of bone say nothing, so at least one voxel that exists
         changes its material, or, as a muscle, its phase.
         """
         settings, rows = self.settings, np.arange(len(genomes))
-        masks = self.masks(genomes[:, :, PRESENCE] - 0.5)
         chosen = rng.random(genomes.shape, dtype=np.float32) < settings.mutation_rate
         chosen[:, :, PRESENCE] = False
         one = _one_of(masks, rng)
@@ -152,13 +171,6 @@ class VoxelsEncoding(VoxelBody, ArrayGenomes):
         changed[rows, one, MATERIAL] = np.where(
             times, changed[rows, one, MATERIAL], other - np.floor(other)
         )
-        # What may come or go: the voxels of the body and those beside it.
-        shapes = rng.random(len(rows)) < settings.body_rate
-        near = masks | self.lattice.beside(masks)
-        flips = near & (rng.random(near.shape) < 0.5 * settings.mutation_rate)
-        flips[rows, _one_of(near, rng)] = True
-        flips &= shapes[:, None]
-        changed[:, :, PRESENCE][flips] = 1.0 - changed[:, :, PRESENCE][flips]
         return changed
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:

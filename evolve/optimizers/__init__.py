@@ -13,9 +13,12 @@ from evolve.optimizers.coevolution import Coevolution, CoevolutionSettings
 from evolve.optimizers.crowding import CrowdingSettings, DeterministicCrowding
 from evolve.optimizers.genetic import GeneticAlgorithm, GeneticSettings
 from evolve.optimizers.hill_climber import HillClimber, HillClimberSettings
+from evolve.optimizers.learning import Learning, LearningSettings
 from evolve.optimizers.map_elites import MapElites, MapElitesSettings
+from evolve.optimizers.novelty import Novelty, NoveltySettings
 from evolve.optimizers.nsga2 import Nsga2, Nsga2Settings
 from evolve.optimizers.random_search import RandomSearch, RandomSettings
+from evolve.optimizers.speciation import Speciation, SpeciationSettings
 from evolve.optimizers.steady_state import SteadyState, SteadyStateSettings
 
 __all__ = [
@@ -35,14 +38,20 @@ __all__ = [
     "HillClimber",
     "HillClimberSettings",
     "Individuals",
+    "Learning",
+    "LearningSettings",
     "MapElites",
     "MapElitesSettings",
+    "Novelty",
+    "NoveltySettings",
     "Nsga2",
     "Nsga2Settings",
     "Optimizer",
     "OptimizerSettings",
     "RandomSearch",
     "RandomSettings",
+    "Speciation",
+    "SpeciationSettings",
     "SteadyState",
     "SteadyStateSettings",
 ]
@@ -57,6 +66,9 @@ OPTIMIZERS: dict[str, type[Optimizer]] = {
     "cma": CmaEs,
     "nsga2": Nsga2,
     "map_elites": MapElites,
+    "novelty": Novelty,
+    "speciation": Speciation,
+    "learning": Learning,
     "coevolution": Coevolution,
 }
 """Name in the configuration -> class."""

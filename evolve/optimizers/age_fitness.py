@@ -74,8 +74,9 @@ class AgeFitness(Breeder):
         self._survivors, self._ages = self._take(pool, kept), ages[kept]
 
     def _state(self) -> dict[str, np.ndarray]:
-        return {**super()._state(), "ages": self._ages}
+        return {**super()._state(), "ages": self._ages, "young_ages": self._young_ages}
 
     def _restore(self, state: Mapping[str, np.ndarray], recall: Recall) -> None:
         super()._restore(state, recall)
         self._ages = np.array(state["ages"], dtype=np.int64)
+        self._young_ages = np.array(state["young_ages"], dtype=np.int64)

@@ -14,7 +14,16 @@ from evolve.encodings.base import Encoding, Genomes
 from evolve.judging.scores import Scores
 from evolve.streams import Role, Streams
 
-__all__ = ["NOBODY", "Candidates", "Individuals", "Optimizer", "OptimizerSettings", "Recall"]
+__all__ = [
+    "NOBODY",
+    "Candidates",
+    "Individuals",
+    "Optimizer",
+    "OptimizerSettings",
+    "PopulationOptimizer",
+    "Recall",
+    "described",
+]
 
 NOBODY = -1
 """In place of the id of a parent that does not exist."""
@@ -175,6 +184,19 @@ class Optimizer(ABC):
             self.encoding.concatenate([part.genomes for part in parts]),
             Scores.concatenate([part.scores for part in parts]),
         )
+
+
+def described(scores: Scores, names: Sequence[str]) -> np.ndarray:
+    """Some descriptors of n individuals, shape (n, len(names)).
+
+    Raises:
+        ValueError: There is no such descriptor.
+    """
+    known = scores.descriptors
+    for name in names:
+        if name not in known:
+            raise ValueError(f"descriptor {name!r}: there is none; there are {', '.join(known)}")
+    return np.stack([known[name] for name in names], axis=1)
 
 
 class PopulationOptimizer(Optimizer):

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from evolve.encodings.base import Encoding
 from evolve.errors import RunError
-from evolve.optimizers.base import Individuals, OptimizerSettings
+from evolve.optimizers.base import Individuals, OptimizerSettings, described
 from evolve.optimizers.variation import Breeder, BreedingSettings
 from evolve.streams import Role, Streams
 
@@ -97,10 +97,4 @@ class MapElites(Breeder):
         self._survivors = self._take(pool, elites["solution"][np.argsort(elites["index"])])
 
     def _measures(self, individuals: Individuals) -> np.ndarray:
-        known = individuals.scores.descriptors
-        for name in self.settings.descriptors:
-            if name not in known:
-                raise ValueError(
-                    f"descriptor {name!r}: there is none; there are {', '.join(known)}"
-                )
-        return np.stack([known[name] for name in self.settings.descriptors], axis=1)
+        return described(individuals.scores, self.settings.descriptors)
