@@ -14,7 +14,7 @@ from evolve.optimizers import OPTIMIZERS
 from warp_springs import config as configs
 
 if TYPE_CHECKING:
-    from evolve.encodings import Encoding
+    from evolve.encodings import Encoding, EncodingSettings
     from evolve.optimizers import Optimizer
 
 __all__ = [
@@ -251,7 +251,8 @@ class RunConfig(configs.Section):
 
     @model_validator(mode="after")
     def _has_the_body_it_needs(self) -> RunConfig:
-        needs, name = ENCODINGS[self.encoding.type].needs_body, self.encoding.type
+        name = self._robots.type
+        needs = ENCODINGS[name].needs_body
         if needs and self.body is None:
             raise ValueError(f"body: the encoding {name} needs one; add a table [body]")
         if not needs and self.body is not None:
@@ -267,7 +268,12 @@ class RunConfig(configs.Section):
     @property
     def fixed_body(self) -> bool:
         """Whether all robots share one body, rather than evolving their own."""
-        return ENCODINGS[self.encoding.type].fixed_body
+        return ENCODINGS[self._robots.type].fixed_body
+
+    @property
+    def _robots(self) -> EncodingSettings:
+        """Settings of the encoding that makes robots, in an arena too."""
+        return getattr(self.encoding, "robot", self.encoding)
 
     def make_encoding(self) -> Encoding:
         """Make the encoding, over the configured body if there is one."""

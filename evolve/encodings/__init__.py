@@ -22,6 +22,7 @@ from evolve.encodings.morphology import MorphologyEncoding, MorphologySettings
 from evolve.encodings.neural import NeuralEncoding, NeuralSettings
 from evolve.encodings.regions import RegionsEncoding, RegionsSettings
 from evolve.encodings.voxels import VoxelsEncoding, VoxelsSettings
+from warp_springs import config as configs
 
 __all__ = [
     "ENCODINGS",
@@ -77,3 +78,12 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "grammar": GrammarEncoding,
 }
 """Name in the configuration -> class."""
+
+# An arena holds robots of any other encoding.
+ArenaSettings.model_rebuild(
+    _types_namespace={
+        "AnyRobot": configs.one_of(
+            (cls.Settings for cls in ENCODINGS.values() if cls is not ArenaEncoding), "type"
+        )
+    }
+)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -44,7 +44,7 @@ class Coevolution(Optimizer):
 
     def __init__(self, encoding: Encoding, streams: Streams, settings: Any) -> None:
         super().__init__(encoding, streams, settings)
-        if not hasattr(encoding, "split"):
+        if not hasattr(encoding, "sides"):
             raise ValueError("coevolution: needs two populations in a genome, encoding 'arena'")
         self._pools: list[Individuals] = []  # of robots and of hills: a meeting of each
         self._worths: list[np.ndarray] = []
@@ -62,41 +62,43 @@ class Coevolution(Optimizer):
             [rng.permutation(settings.hills) for _ in range(-(-n // settings.hills))]
         )
         hill = shuffled[:n]
-        met = self.encoding.joined(genes[0][robot], genes[1][hill])
+        both = (
+            side.take(found, which)
+            for side, found, which in zip(self.encoding.sides, genes, (robot, hill), strict=True)
+        )
+        met = self.encoding.joined(*both)
         return met, np.stack([parents[0][robot], parents[1][hill]], axis=1)
 
-    def _brood(self, side: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Genes of a new generation of robots (side 0) or hills (1), and a parent of each."""
-        rng = self.streams(self.turn, Role.INITIAL, side)
+    def _brood(self, number: int, count: int) -> tuple[Genomes, np.ndarray]:
+        """A new generation of robots (side 0) or hills (1), and a parent of each."""
+        side, rng = self.encoding.sides[number], self.streams(self.turn, Role.INITIAL, number)
         if not self._pools:
-            return self.encoding.split(self.encoding.random(count, rng))[side], np.full(
-                count, NOBODY
-            )
-        pool, size = self._pools[side], len(self._pools[side])
+            return side.random(count, rng), np.full(count, NOBODY)
+        pool, size = self._pools[number], len(self._pools[number])
+        living = self.encoding.split(pool.genomes)[number]
         elite = np.arange(min(round(self.settings.elites * count), size))
         drawn = rng.integers(size, size=(2, count - len(elite), self.settings.tournament))
         a, b = drawn.min(axis=2)  # sorted, the best first
-        mother, father = (self.encoding.take(pool.genomes, which) for which in (a, b))
-        cross = self.streams(self.turn, Role.CROSSOVER, side)
-        mutate = self.streams(self.turn, Role.MUTATION, side)
-        young = self.encoding.mutate(self.encoding.cross(mother, father, cross), mutate)
-        old = self.encoding.take(pool.genomes, elite)
-        genes = self.encoding.split(np.concatenate([old, young]))[side]
+        cross = self.streams(self.turn, Role.CROSSOVER, number)
+        mutate = self.streams(self.turn, Role.MUTATION, number)
+        young = side.mutate(side.cross(side.take(living, a), side.take(living, b), cross), mutate)
+        genes = side.concatenate([side.take(living, elite), young])
         return genes, pool.ids[np.concatenate([elite, a])]
 
     def _tell(self, individuals: Individuals) -> None:
         self._pools, self._worths = [], []
         worth = individuals.scores.worth
-        for side, sign in enumerate((1.0, -1.0)):
-            genes = self.encoding.split(individuals.genomes)[side]
-            _, first, kind = np.unique(genes, axis=0, return_index=True, return_inverse=True)
-            kind = kind.ravel()
+        genes = self.encoding.split(individuals.genomes)
+        for number, sign in enumerate((1.0, -1.0)):
+            first, kind = _kinds(self.encoding.sides[number].to_bytes(genes[number]))
             met = np.bincount(kind)
             good = np.isfinite(worth)
             sums = np.bincount(kind, np.where(good, worth, 0.0))
             healthy = np.bincount(kind, good)
             mean = np.where(
-                healthy == met if side == 0 else healthy > 0, sums / np.maximum(healthy, 1), np.nan
+                healthy == met if number == 0 else healthy > 0,
+                sums / np.maximum(healthy, 1),
+                np.nan,
             )
             value = np.where(np.isnan(mean), -np.inf, sign * mean)
             best = np.lexsort((first, -value))
@@ -118,3 +120,10 @@ class Coevolution(Optimizer):
         names = [name for name in ("robots", "hills") if name in state]
         self._pools = [recall(state[name]) for name in names]
         self._worths = [state[f"{name}_worth"] for name in names]
+
+
+def _kinds(blobs: Sequence[bytes]) -> tuple[np.ndarray, np.ndarray]:
+    """Where each of K different genomes is first, (K,), and which of them each of n is, (n,)."""
+    numbers: dict[bytes, int] = {}
+    kind = np.array([numbers.setdefault(blob, len(numbers)) for blob in blobs])
+    return np.unique(kind, return_index=True)[1], kind

@@ -45,8 +45,17 @@ class Vectors(ArrayGenomes):
         return np.abs(a - b).mean(axis=1)
 
 
+class Part(Vectors):
+    """Genes of one of two populations."""
+
+    def __init__(self, size):
+        self.genome_shape = (size,)
+
+
 class Pairs(Vectors):
     """Two populations in one genome."""
+
+    sides = (Part(8), Part(4))
 
     def split(self, genomes):
         return genomes[:, :8], genomes[:, 8:]
