@@ -2,7 +2,6 @@
 
     python -m benchmarks.bodies packing      # built and stepped, all different against all alike
     python -m benchmarks.bodies genomes      # random genomes of every encoding, stepped 100 times
-    python -m benchmarks.bodies search       # body search against controllers of a fixed body
 
 Prints one JSON object a line.
 """
@@ -18,19 +17,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import warp_springs as ws
-from benchmarks.search import finish
-from evolve import Evaluator
 from evolve.encodings import ENCODINGS
-from evolve.encodings.base import Genomes
-from evolve.search import Search
-from evolve.toml import load
 
 SCENE = ws.Scene(ground=ws.Ground(), damping=4.0)
 DT = 1e-3
 BATCH = 1000
 """Genomes that are stepped together."""
-LOOKED_AT = 32
-"""Individuals of a search that get a second look."""
 
 
 def different(n: int, springs: int, seed: int) -> list[ws.Robot]:
@@ -133,35 +125,6 @@ def genomes(options: argparse.Namespace) -> None:
         )
 
 
-def search(options: argparse.Namespace) -> None:
-    """The best of body searches and of fixed-body searches on equal evaluations."""
-    common = {
-        "population": options.population,
-        "generations": options.generations,
-        "task.fitness": "steady",
-        "simulation.precision": "float32",
-    }
-    for name, seed in itertools.product(options.presets, range(1, options.seeds + 1)):
-        found = Search(load(name, common | {"seed": seed}))
-        genomes, fitness, *_ = finish(found, LOOKED_AT)
-        _say(
-            what="search",
-            preset=name,
-            fixed_body=found.config.fixed_body,
-            seed=seed,
-            evaluations=found.optimizer.evaluations,
-            steady=found.optimizer.best_fitness,
-            survivor=_survivor(found, genomes, fitness),
-        )
-        found.close()
-
-
-def _survivor(found: Search, genomes: Genomes, fitness: np.ndarray) -> float:
-    """Fitness of the best that passes the second look, or 0."""
-    look = Evaluator(found.config).second_look(list(found.encoding.express(genomes)), fitness)
-    return float(np.max(fitness[look.survives], initial=0.0))
-
-
 def _say(**row: object) -> None:
     print(json.dumps(row), flush=True)
 
@@ -169,7 +132,6 @@ def _say(**row: object) -> None:
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "packing": packing,
     "genomes": genomes,
-    "search": search,
 }
 
 
@@ -184,10 +146,6 @@ def main() -> None:
     parser.add_argument("--genomes", type=int, default=1_000_000, help="over all encodings")
     parser.add_argument("--encodings", nargs="*", default=(), help="only these; their share each")
     parser.add_argument("--threads", type=int, default=1, help="that step genomes")
-    parser.add_argument("--presets", nargs="+", default=["creature", "critter", "walker", "cube"])
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--population", type=int, default=128)
-    parser.add_argument("--generations", type=int, default=40)
     options = parser.parse_args()
     COMMANDS[options.what](options)
 

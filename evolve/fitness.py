@@ -278,11 +278,18 @@ def symmetry(trial: Trial) -> np.ndarray:
 
 @measure("", path=True)
 def footfall(trial: Trial) -> np.ndarray:
-    """Share of the sampled instants at which some mass touches the ground z = 0."""
-    lowest = [
-        [piece.positions(i)[:, 2].min() for i in range(len(trial.robots))] for piece in trial.pieces
-    ]
-    return (np.array(lowest) <= 0.0).mean(axis=0)
+    """Share of the time that a foot stands on the ground z = 0, on average.
+
+    Feet are the masses that touch it at one of the sampled instants. 1 crawls, a runner is below
+    one half; 0 has no feet.
+    """
+    return np.array([_duty(trial, i) for i in range(len(trial.robots))])
+
+
+def _duty(trial: Trial, robot: int) -> float:
+    """Mean share of the sampled instants at which a foot of a robot is down."""
+    down = np.mean([piece.positions(robot)[:, 2] <= 0.0 for piece in trial.pieces], axis=0)
+    return float(down[down > 0.0].mean()) if down.any() else 0.0
 
 
 def _symmetry(robot: ws.Robot) -> float:

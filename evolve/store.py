@@ -250,6 +250,21 @@ class Store:
         rows = [self._one(query, i) + self._one(described, i)[1:] for i in ids]
         return _scores(rows, names)
 
+    def descriptors(self, names: Sequence[str]) -> np.ndarray:
+        """Some descriptors of everybody, in the order of the ids, shape (n, len(names)).
+
+        Raises:
+            StoreError: A descriptor was not recorded.
+        """
+        known = self._connection.execute("SELECT * FROM descriptor LIMIT 0").description
+        known = [column[0] for column in known[1:]]
+        for name in names:
+            if name not in known:
+                raise StoreError(f"{self.path} has no descriptor {name!r}: {', '.join(known)}")
+        columns = ", ".join(f'"{name}"' for name in names)
+        rows = self._connection.execute(f"SELECT {columns} FROM descriptor ORDER BY individual")
+        return np.array(rows.fetchall(), dtype=np.float64).reshape(-1, len(names))
+
     def parents_of(self, individual: int) -> list[int]:
         """The ids of an individual's parents, the first parent first; none of the first ones."""
         query = "SELECT parent FROM parent WHERE child = ? ORDER BY place"

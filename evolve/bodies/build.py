@@ -25,7 +25,7 @@ def fits(plan: Plan, settings: BodySettings) -> bool:
 
 
 def robot(plan: Plan, settings: BodySettings) -> ws.Robot:
-    """The robot of a tidy plan: of the mass that all have, its lowest point on the ground.
+    """The robot of a tidy plan: of the mass that the settings say, its lowest point on the ground.
 
     L0(t) = a + b sin(2 pi t / period + c) for every spring, from its genes.
 
@@ -42,7 +42,7 @@ def robot(plan: Plan, settings: BodySettings) -> ws.Robot:
     (low, high), (soft, hard) = settings.rest_length, settings.stiffness
     shares = plan.shares.astype(np.float64)
     return ws.Robot(
-        masses=settings.mass * shares / shares.sum(),
+        masses=settings.weight(len(shares)) * shares / shares.sum(),
         positions=positions,
         springs=plan.springs,
         stiffness=soft * (hard / soft) ** genes[:, STIFFNESS],

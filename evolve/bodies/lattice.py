@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -72,7 +73,7 @@ class Lattice:
         masks: np.ndarray,
         stiffness: np.ndarray,
         swing: np.ndarray,
-        mass: float,
+        weight: Callable[[int], float],
         period: float,
     ) -> list[ws.Robot]:
         """A robot for each of n masks; a spring does what the voxels that share it do on average.
@@ -81,7 +82,7 @@ class Lattice:
             masks: Which voxels exist, each robot in one part, shape (n, V), bool.
             stiffness: Of the springs of a voxel [N/m], shape (n, V).
             swing: Amplitude in lengths of the spring and phase as b exp(ic), shape (n, V), complex.
-            mass: Of every robot [kg].
+            weight: Mass of a robot of so many points [kg].
             period: Length of an actuation cycle [s].
         """
         omega = 2.0 * np.pi / period
@@ -96,7 +97,7 @@ class Lattice:
             amplitude = np.abs(mean)
             robots.append(
                 body.replace(
-                    masses=np.full(body.n_masses, mass / body.n_masses),
+                    masses=np.full(body.n_masses, weight(body.n_masses) / body.n_masses),
                     stiffness=np.exp(log[row][owners].sum(axis=0) / count),
                     amplitude=body.rest_length * amplitude,
                     phase=np.where(amplitude > 0.0, np.angle(mean), 0.0),

@@ -8,14 +8,25 @@ from pydantic import Field
 
 from evolve.encodings.base import EncodingSettings, Interval
 
-__all__ = ["BodySettings", "EvolvingBody"]
+__all__ = ["BodySettings", "EvolvingBody", "WeightSettings"]
 
 
-class BodySettings(EncodingSettings):
-    """What evolved bodies may weigh, measure and do; the same for every encoding of bodies."""
+class WeightSettings(EncodingSettings):
+    """What evolved bodies weigh; the same for every encoding of bodies."""
 
     mass: float = Field(4.0, gt=0.0)
     """Mass of every robot, however many points it has [kg]."""
+    mass_per_point: float | None = Field(None, gt=0.0)
+    """Mean mass of a point instead, so that larger bodies weigh more [kg]."""
+
+    def weight(self, points: int) -> float:
+        """Mass of a robot of so many points [kg]."""
+        return self.mass if self.mass_per_point is None else points * self.mass_per_point
+
+
+class BodySettings(WeightSettings):
+    """What evolved bodies may measure and do; the same for every encoding of bodies."""
+
     largest_extent: float = Field(1.0, gt=0.0)
     """Longest side of the bounding box that a body may have [m]."""
     most_masses: int = Field(64, ge=4)

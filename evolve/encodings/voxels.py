@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from evolve.bodies.lattice import Lattice
 from evolve.encodings.base import ArrayGenomes, EncodingSettings, folded
-from evolve.encodings.evolving import EvolvingBody
+from evolve.encodings.evolving import EvolvingBody, WeightSettings
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -20,15 +20,13 @@ PRESENCE, MATERIAL, PHASE = range(3)
 """Columns of a genome."""
 
 
-class VoxelBodySettings(EncodingSettings):
+class VoxelBodySettings(WeightSettings):
     """The lattice from which bodies are cut, and what voxels may be made of."""
 
     cells: tuple[int, int, int] = (4, 3, 3)
     """Most voxels along x, y and z."""
     edge: float = Field(0.1, gt=0.0)
     """Length of a voxel's edge [m]."""
-    mass: float = Field(4.0, gt=0.0)
-    """Mass of every robot, however many voxels it has [kg]."""
     least_voxels: int = Field(4, ge=1)
     """Bodies with fewer are filled up, cube by cube, where they come nearest to being."""
     soft: float = Field(1000.0, gt=0.0)
@@ -87,7 +85,7 @@ class VoxelBody(EvolvingBody):
         stiffness = np.array([settings.soft, settings.hard, settings.muscle])[kind]
         swing = settings.amplitude * (kind == 2) * np.exp(2j * np.pi * phase)
         return self.lattice.robots(
-            self.masks(presence), stiffness, swing, settings.mass, settings.period
+            self.masks(presence), stiffness, swing, settings.weight, settings.period
         )
 
 

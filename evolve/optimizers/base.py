@@ -39,6 +39,11 @@ class OptimizerSettings(BaseModel):
         """Names of the measures that it looks at beside the fitness."""
         return ()
 
+    @property
+    def niches(self) -> tuple[str, ...]:
+        """Those by which it tells individuals apart, to keep some of each kind."""
+        return ()
+
 
 @dataclass(frozen=True)
 class Candidates:

@@ -54,6 +54,11 @@ class LearningSettings(OptimizerSettings):
         """What the search for bodies looks at."""
         return self.bodies.measures
 
+    @property
+    def niches(self) -> tuple[str, ...]:
+        """By which the search for bodies tells them apart."""
+        return self.bodies.niches
+
 
 class Learning(Optimizer):
     """Body and controller at different rates: an inner search of controllers for every body.

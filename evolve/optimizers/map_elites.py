@@ -36,6 +36,11 @@ class MapElitesSettings(BreedingSettings):
         """What spans the grid."""
         return self.descriptors
 
+    @property
+    def niches(self) -> tuple[str, ...]:
+        """The same."""
+        return self.descriptors
+
     @model_validator(mode="after")
     def _fits(self) -> MapElitesSettings:
         count = len(self.descriptors)

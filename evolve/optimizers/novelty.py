@@ -40,6 +40,11 @@ class NoveltySettings(BreedingSettings):
         """What individuals are compared in."""
         return self.descriptors
 
+    @property
+    def niches(self) -> tuple[str, ...]:
+        """The same."""
+        return self.descriptors
+
 
 class Novelty(Breeder):
     """Lehman and Stanley's search (2011): the novel survive, or the novel and fit.

@@ -1,4 +1,4 @@
-"""Which robots show what a run that evolves bodies has found: good ones, each unlike the others."""
+"""Which robots show what a run has found that keeps kinds apart: good ones, unlike each other."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from evolve.config import DESCRIPTORS
+from evolve.reports.archive import atlas, niches
 from evolve.run import Run
 from evolve.store import Finalist, Store
 
@@ -19,26 +20,29 @@ SHARE = 0.4
 
 
 def various(run: Run, store: Store, count: int) -> list[int]:
-    """Ids of good individuals that differ in what is measured of their bodies, the best first.
+    """Ids of good individuals that differ in their `niches`, the best first.
 
     Each next one is, of the good, the one least like those before: farthest from the nearest of
-    them in the descriptors that the run records beside way and height (in these, where it records
-    no other), each in units of its standard deviation.
+    them in those descriptors (in way and height, where there are none), each in units of its
+    standard deviation. An optimizer with an archive has the best of each of its cells considered,
+    others the best of all.
 
     Args:
         run: A run in which somebody has a fitness.
         store: Its record.
         count: How many; fewer where fewer are good.
     """
-    ids = store.best(CANDIDATES)
-    scores = store.scores(ids)
-    names = [name for name in run.config.descriptors if name not in DESCRIPTORS]
-    values = np.stack([scores.descriptors[name] for name in names or DESCRIPTORS], axis=1)
+    best = store.best(CANDIDATES)
+    if run.config.optimizer.niches and (found := atlas(run, store)) is not None:
+        best = list(dict.fromkeys([best[0], *found.filled.tolist()]))
+    scores = store.scores(best)
+    names = niches(run.config) or DESCRIPTORS
+    values = np.stack([scores.descriptors[name] for name in names], axis=1)
     least = scores.fitness[0] * (SHARE if scores.fitness[0] > 0.0 else 1.0 / SHARE)
     good = (scores.fitness >= least) & np.isfinite(values).all(axis=1)
     good[0] = True
     chosen = spread_out(np.nan_to_num(values[good]), count)
-    return [ids[place] for place in np.flatnonzero(good)[chosen]]
+    return [best[place] for place in np.flatnonzero(good)[chosen]]
 
 
 def spread_out(values: np.ndarray, count: int) -> np.ndarray:
@@ -58,10 +62,10 @@ def spread_out(values: np.ndarray, count: int) -> np.ndarray:
 def shown(run: Run, store: Store, finalists: Sequence[Finalist], count: int) -> Sequence[Finalist]:
     """Who of those that were looked at twice is shown in the zoo.
 
-    The best, if all share one body; else the champion and `various` others, filled up with the
-    best where there are too few of them.
+    The best, if nothing tells individuals apart but their fitness; else the champion and `various`
+    others, filled up with the best where there are too few of them.
     """
-    if run.config.fixed_body:
+    if not niches(run.config):
         return finalists[:count]
     wanted = set(various(run, store, count))
     different = [one for one in finalists[1:] if one.id in wanted]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evolve.encodings.base import Encoding, Genomes
 from evolve.run import Run
 from evolve.streams import Role, Streams
 
@@ -19,6 +20,8 @@ GENERATIONS = 48
 """Generations that are looked at, evenly spread over a run."""
 PAIRS = 64
 """Pairs of individuals that are compared in each."""
+OF_BODY = ("mass", "diameter", "springs", "muscles", "symmetry")
+"""Descriptors that say what a body is, not what it does."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,12 @@ class Diversity:
     """Mean distance of two individuals in their descriptors, each in units of its standard
     deviation over the looked-at individuals of the run, divided by the square root of their
     number, shape (G,). NaN where fewer than two individuals have any."""
+    shape: np.ndarray | None = None
+    """The same, in the descriptors of the body that are recorded; None where all share one body, or
+    none is recorded."""
+    bodies: np.ndarray | None = None
+    """Share of different topologies among the looked-at individuals, shape (G,); None where all
+    share one body."""
 
 
 def diversity(run: Run) -> Diversity:
@@ -41,7 +50,7 @@ def diversity(run: Run) -> Diversity:
 
     The pairs are drawn from a stream of the run's seed, so the figures can be had again.
     """
-    encoding = run.config.make_encoding()
+    encoding, evolving = run.config.make_encoding(), not run.config.fixed_body
     streams = Streams(run.config.seed)
     with run.read() as store:
         record = store.record()
@@ -49,7 +58,7 @@ def diversity(run: Run) -> Diversity:
         looked = numbers[
             np.linspace(0, len(numbers) - 1, min(GENERATIONS, len(numbers))).astype(int)
         ]
-        ends, genotype, described = [], [], []
+        ends, genotype, described, bodies = [], [], [], []
         for number in looked:
             ids = record.ids[record.generations == number]
             rng = streams(int(number), Role.DIVERSITY)
@@ -59,23 +68,46 @@ def diversity(run: Run) -> Diversity:
             genomes = encoding.from_bytes(store.genomes(pairs))
             halves = (encoding.take(genomes, np.arange(k * PAIRS, (k + 1) * PAIRS)) for k in (0, 1))
             genotype.append(float(np.mean(encoding.distance(*halves))))
-            columns = store.scores(pairs).descriptors.values()
-            described.append(np.stack(list(columns), axis=1))
+            columns = store.scores(pairs).descriptors
+            described.append(np.stack(list(columns.values()), axis=1))
+            if evolving:
+                bodies.append(_different(encoding, genomes, pairs))
             ends.append(int(ids[-1]))
-    return Diversity(np.array(ends), np.array(genotype), _spread(np.stack(described)))
+    values, names = np.stack(described), list(columns)
+    of_body = [names.index(name) for name in names if name in OF_BODY]
+    moving = [place for place in range(len(names)) if place not in of_body]
+    return Diversity(
+        np.array(ends),
+        np.array(genotype),
+        _spread(values[:, :, moving]),
+        _spread(values[:, :, of_body]) if evolving and of_body else None,
+        np.array(bodies) if evolving else None,
+    )
+
+
+def _different(encoding: Encoding, genomes: Genomes, ids: np.ndarray) -> float:
+    """Share of different topologies among some different individuals."""
+    _, first = np.unique(ids, return_index=True)
+    robots = encoding.express(encoding.take(genomes, first))
+    return len({robot.topology for robot in robots}) / len(first)
 
 
 def diversity_plot(ax: Axes, found: Diversity) -> Axes:
-    """Draw the diversity of genomes and of behaviour against evaluations.
+    """Draw the diversity of genomes, behaviour and bodies against evaluations.
 
     Args:
         ax: Axes to draw into.
         found: What `diversity` returned.
     """
-    ax.plot(found.evaluations, found.genotype, color="#3a6ea5", linewidth=1.9, label="genomes")
-    ax.plot(
-        found.evaluations, found.behaviour, "--", color="#c8452d", linewidth=1.9, label="behaviour"
+    lines = (
+        ("genomes", found.genotype, "-", "#3a6ea5"),
+        ("behaviour", found.behaviour, "--", "#c8452d"),
+        ("shape of bodies", found.shape, "-.", "#2e8b6f"),
+        ("share of different bodies", found.bodies, ":", "#5b4636"),
     )
+    for label, values, line, color in lines:
+        if values is not None:
+            ax.plot(found.evaluations, values, line, color=color, linewidth=1.9, label=label)
     ax.set_xlabel("evaluations")
     ax.set_ylabel("mean distance of two individuals")
     ax.set_ylim(bottom=0.0)

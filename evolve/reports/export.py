@@ -11,6 +11,7 @@ import numpy as np
 from evolve.errors import RunError
 from evolve.judging.evaluate import Evaluator
 from evolve.judging.worlds import looked_at_again
+from evolve.reports.archive import niches
 from evolve.reports.bodies import shown, various
 from evolve.reports.show import FILM_CYCLES, Show, Style, Watch, label
 from evolve.run import Run
@@ -135,7 +136,7 @@ def trial(run: Run, store: Store, ids: Sequence[int], energy: bool = False) -> w
 def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     """Look twice at the best different individuals, and record what is left of their fitness.
 
-    Where bodies evolve, also at good ones whose bodies are unlike the others.
+    Where bodies evolve, or the optimizer keeps an archive, also at good ones unlike the others.
 
     Returns:
         All of them, survivors first, the fittest first.
@@ -146,7 +147,7 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     ids = store.best(max(best, run.config.task.second_look.candidates))
     if not ids:
         raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to export")
-    if not run.config.fixed_body:
+    if niches(run.config):
         ids = list(dict.fromkeys([*ids, *various(run, store, best)]))
     encoding = run.config.make_encoding()
     genomes = encoding.from_bytes(store.genomes(ids))

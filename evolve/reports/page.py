@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evolve.errors import RunError
+from evolve.reports.archive import atlas, heat_map, niches
 from evolve.reports.comparison import Group, compare, groups
 from evolve.reports.diversity import diversity, diversity_plot
 from evolve.reports.family import family
@@ -105,6 +106,7 @@ def write_report(
         _learning(report, subject, several, store.costs())
         _champion(report, subject)
         _zoo(report, subject)
+        _atlas(report, subject, store)
         if not run.config.fixed_body:
             family(report, run, store, subject.zoo[0])
         if len(several) > 1:
@@ -175,7 +177,7 @@ def _learning(
         report.plot(
             spread,
             "Diversity: mean distance of two random individuals of a generation. Genomes: 0 equal, "
-            "about 1 unrelated. Behaviour: in standard deviations of what is measured of a robot.",
+            "about 1 unrelated. Behaviour and shape: in standard deviations of what is measured.",
         ),
         report.plot(cost, "Best so far against what it cost."),
     )
@@ -206,8 +208,13 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
 
     report.section("Zoo")
     labels = [f"#{i}   {subject.fitness(i):.2f}" for i in subject.zoo]
-    kind = "best different" if subject.run.config.fixed_body else "good and most unlike"
-    words = f"The {len(labels)} {kind} individuals at the end of their trial."
+    apart = niches(subject.run.config)
+    words = f"The {len(labels)} best different individuals at the end of their trial."
+    if apart:
+        words = (
+            f"The best, and {len(labels) - 1} good individuals that differ most from each other in "
+            f"{_listed(apart)}, at the end of their trial."
+        )
     report.row(report.still(subject.film, words, labels=labels))
     if subject.finalists:
         report.table(
@@ -220,6 +227,29 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
              "left from perturbed starts", "survives"),
             caption=f"Second look: {demotions(subject.finalists)}.",
         )  # fmt: skip
+
+
+def _atlas(report: ws.Document, subject: Subject, store: Store) -> None:
+    """The best of every kind as a heat map, where more than fitness tells individuals apart."""
+    found = atlas(subject.run, store)
+    if found is None:
+        return
+    report.section("Atlas")
+    described = store.scores(subject.zoo).descriptors
+    nothing = np.full(len(subject.zoo), 0.5)
+    places = np.stack([described.get(name, nothing) for name in found.names], axis=1)
+    chart = figure(8.4, 5.0)
+    heat_map(chart.subplots(), found, subject.run.config.task.fitness, places)
+    words = (
+        f"The fitness of the best of every kind that was found, {len(found.filled):,} kinds "
+        f"({found.coverage:.0%} of the cells); the numbers are the robots of the zoo, in its order."
+    )
+    report.row(report.plot(chart, words))
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _comparison(report: ws.Document, subject: Subject, several: Sequence[Group]) -> None:

@@ -61,6 +61,16 @@ def test_every_genome_is_a_connected_body_on_the_ground_of_the_mass_that_all_hav
 
 
 @pytest.mark.parametrize("name", EVOLVING)
+def test_larger_bodies_weigh_more_where_points_have_a_mass(name):
+    cls = ENCODINGS[name]
+    settings = cls.Settings(mass_per_point=0.05)
+    encoding = cls(SEED_BODY if cls.needs_body else None, settings)
+    robots = encoding.express(genomes_of(name, 100)[:20])
+    np.testing.assert_allclose([r.mass for r in robots], [0.05 * r.n_masses for r in robots])
+    assert len({r.n_masses for r in robots}) > 3
+
+
+@pytest.mark.parametrize("name", EVOLVING)
 def test_operators_are_pure_and_repeatable(name):
     encoding, genomes = make(name), genomes_of(name, 20)
     before, others = encoding.to_bytes(genomes), encoding.random(20, rng(7))
@@ -258,3 +268,17 @@ def test_descriptors_of_bodies():
     found = FITNESS["symmetry"](trial)
     np.testing.assert_allclose(found[[0, 1]], 1.0, atol=1e-12)
     assert found[2] < 0.9
+
+
+def test_footfall_is_how_long_the_feet_stand():
+    """A cube that drops has no foot on the ground in flight; one that rests has four all along."""
+    cube = ws.shapes.cube(edge=0.1)
+    falling = cube.moved((0.0, 0.0, 1.0))
+    scene = ws.Scene(ground=ws.Ground(), damping=1.0)
+    simulation = ws.Simulation([cube, falling], scene, dt=1e-3)
+    settled = simulation.run(0.2)
+    pieces = [simulation.run(0.01) for _ in range(80)]
+    found = FITNESS["footfall"](Trial([cube, falling], settled, pieces))
+    assert found[0] == pytest.approx(1.0)
+    landed = np.sqrt(2.0 / 9.81)
+    assert 0.0 < found[1] < (1.0 - landed) / 0.8, "its feet stand after it landed, at most"

@@ -1,0 +1,137 @@
+"""Does it pay to evolve bodies? Searches for bodies against controllers of a fixed body.
+
+    python -m benchmarks.body_search                     # every search, five seeds; resumes
+    python -m benchmarks.body_search --only critter walker --seeds 2
+    python -m benchmarks.body_search --draw benchmarks/figures/body_search.png
+
+Equal evaluations, physics, cycles and amplitudes; the fitness is `steady`, body diameters per cycle
+in the slower half of the measurement. Each search is a folder of runs, so that one that was stopped
+goes on where it was. The table shows the mean over seeds of the fittest who survives the second
+look.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import warp_springs as ws
+from evolve import Run, load
+from evolve.reports.comparison import Group, compare, groups
+from evolve.reports.export import crown
+from evolve.reports.plots import figure
+from evolve.run import create_seeds, evolve_together, open_all
+from evolve.store import Store
+
+COMMON: Mapping[str, Any] = {
+    "population": 192,
+    "generations": 80,
+    "encoding.period": 1.0,
+    "encoding.amplitude": 0.2,
+    "task.fitness": "steady",
+    "task.settle": 1.0,
+    "task.measure": 4.0,
+    "scene.damping": 4.0,
+    "simulation.dt": 1e-3,
+    "simulation.precision": "float32",
+}
+HARMONIC = {"encoding.type": "harmonics", "encoding.harmonics": 3}
+GENETIC = {"optimizer.type": "genetic"}
+LEARNING = {"optimizer": {"type": "learning", "tries": 4, "lessons": 2}}
+
+SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
+    "walker": ("walker", GENETIC),
+    "walker, harmonics": ("walker", GENETIC | HARMONIC),
+    "tripod": ("tripod", GENETIC | {"encoding.type": "direct"}),
+    "tripod, harmonics": ("tripod", GENETIC | HARMONIC),
+    "cube": ("cube", GENETIC),
+    "cube, harmonics": ("cube", GENETIC | HARMONIC),
+    "creature": ("creature", {}),
+    "creature, genetic": ("creature", GENETIC),
+    "critter": ("critter", {}),
+    "critter, genetic": ("critter", GENETIC),
+    "critter, learning": ("critter", LEARNING),
+    "jelly, genetic": ("jelly", GENETIC),
+    "blueprint, genetic": ("blueprint", GENETIC),
+    "strider, genetic": ("strider", GENETIC),
+}
+"""Name -> preset, and what differs from it; bodies are fixed in the first six."""
+
+
+def runs_of(name: str, options: argparse.Namespace) -> list[Run]:
+    """The runs of a search, one for each seed, evolved to their end and looked at twice."""
+    folder = options.out / name.replace(", ", "-").replace(" ", "-")
+    if folder.exists():
+        runs = open_all(folder)
+    else:
+        preset, changes = SEARCHES[name]
+        shorter = {"population": options.population, "generations": options.generations}
+        whole = dict(changes) | dict(COMMON) | shorter | {"simulation.threads": options.threads}
+        runs = create_seeds(load(preset, {**changes, **whole}), options.seeds, folder)
+    evolve_together(runs, [lambda progress: None] * len(runs))
+    for run in runs:
+        with Store.open(run.record_path, write=True) as store:
+            if not store.finalists():
+                crown(run, store)
+    return runs
+
+
+def row(name: str, group: Group, fixed: bool) -> str:
+    """A line of the table."""
+    champions = [seed.champion for seed in group.seeds]
+    fitness = np.array([0.0 if one is None else one.fitness for one in champions])
+    error = fitness.std(ddof=1) / np.sqrt(len(fitness)) if len(fitness) > 1 else np.nan
+    lost = sum(one is None for one in champions)
+    cells = [
+        name,
+        "fixed" if fixed else "evolves",
+        f"{len(group.seeds[0].record.ids):,}",
+        str(len(fitness)),
+        *(f"{value:.3f}" for value in (fitness.mean(), error, fitness.max())),
+        str(lost),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def draw(several: Sequence[Group], path: Path) -> None:
+    """The learning curves, with standard errors."""
+    page = figure(10.0, 5.6)
+    ax = compare(page.subplots(), several, "steady")
+    ax.set_title("Evolving bodies against controllers of fixed bodies", loc="left")
+    page.savefig(path)
+
+
+def main() -> None:
+    """Run the searches that have not been run, and print the table of all."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--only", nargs="*", default=list(SEARCHES), choices=SEARCHES)
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--population", type=int, default=COMMON["population"])
+    parser.add_argument("--generations", type=int, default=COMMON["generations"])
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("runs") / "body-search")
+    parser.add_argument("--draw", type=Path, help="picture of the learning curves")
+    options = parser.parse_args()
+    ws.quiet()
+    print("| search | body | evaluations | seeds | mean | error | best | no survivor |")
+    print("|---|---|---|---|---|---|---|---|")
+    found = []
+    for name in options.only:
+        started = time.perf_counter()
+        runs = runs_of(name, options)
+        (group,) = groups(runs)
+        found.append(replace(group, label=name))
+        seconds = time.perf_counter() - started
+        print(f"{row(name, group, runs[0].config.fixed_body)}  {seconds:.0f} s", flush=True)
+    if options.draw is not None:
+        draw(found, options.draw)
+
+
+if __name__ == "__main__":
+    main()
