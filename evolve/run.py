@@ -262,15 +262,15 @@ class Session:
         self._clock = _Clock()
         return self._clock.progress(self.search, None)
 
-    def keep(self, generation: Generation) -> Progress:
-        """Record a generation; how far the search is now."""
+    def keep(self, generation: Generation, together: int = 1) -> Progress:
+        """Record a generation, one of so many that were computed together; how far it is now."""
         self._store.add_generation(
             generation.number,
             generation.candidates,
             generation.blobs,
             generation.scores,
             self.search.state(),
-            self._clock.lap(generation),
+            self._clock.lap(generation, together),
         )
         return self._clock.progress(self.search, generation)
 
@@ -319,7 +319,7 @@ def evolve_together(
                 judge_together(searches) if together else [search.step() for search in searches]
             )
             for i, generation in zip(going, generations, strict=True):
-                watches[i](sessions[i].keep(generation))
+                watches[i](sessions[i].keep(generation, len(going)))
     return True
 
 
@@ -330,13 +330,17 @@ class _Clock:
         self._started = self._lap = time.perf_counter()
         self._recent: deque[tuple[float, float, int]] = deque(maxlen=8)
 
-    def lap(self, generation: Generation) -> Timing:
-        """Times of the generation that ends now; recording the one before counts as driving."""
+    def lap(self, generation: Generation, together: int) -> Timing:
+        """Times of the generation that ends now, its share of those computed together.
+
+        Recording the one before counts as driving.
+        """
         now = time.perf_counter()
         whole, self._lap = now - self._lap, now
         cost = int(generation.scores.spring_evaluations.sum())
         self._recent.append((whole, generation.scores.wall_time, cost))
-        return Timing(generation.scores.wall_time, whole - generation.scores.wall_time)
+        evaluating = generation.scores.wall_time
+        return Timing(evaluating, max(whole / together - evaluating, 0.0))
 
     def progress(self, search: Search, generation: Generation | None) -> Progress:
         """How far the search is after a generation, or before the first."""

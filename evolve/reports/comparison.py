@@ -142,6 +142,8 @@ def _labels(settings: Sequence[dict], configs: Sequence[RunConfig]) -> list[str]
     labels = []
     for flat, config in zip(settings, configs, strict=True):
         words = [str(flat[key]).replace("_", " ") for key in named]
+        if len({other.fixed_body for other in configs}) > 1:
+            words.append("fixed body" if config.fixed_body else "bodies evolve")
         words += [f"{key.rpartition('.')[2]} {flat[key]}" for key in others[:3] if key in flat]
         labels.append(", ".join(words) or config.name)
     return [

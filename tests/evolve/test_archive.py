@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from evolve.reports.archive import atlas, heat_map, niches
 from evolve.reports.bodies import various
+from evolve.reports.comparison import groups
 from evolve.reports.diversity import diversity
 from evolve.run import Run
 from evolve.search import Search
@@ -90,6 +91,8 @@ def test_bodies_have_an_atlas_without_an_archive_and_controllers_have_none(run, 
     with Store.open(controllers.record_path) as store:
         assert atlas(controllers, store) is None
     assert diversity(controllers).bodies is None
+    evolving, fixed = groups([bodies, controllers])
+    assert evolving.label.endswith("bodies evolve") and fixed.label.endswith("fixed body")
 
 
 def test_the_diversity_of_bodies(run):

@@ -92,8 +92,15 @@ def test_seeds_evolved_together_are_what_they_are_alone(tmp_path):
     alone = [digest(evolved(c, tmp_path / f"alone-{c.seed}")) for c in configs]
     runs = [Run.create(c, tmp_path / f"seed-{c.seed}") for c in configs]
     told = [[], [], []]
+    started = time.monotonic()
     assert evolve_together(runs, [t.append for t in told])
+    elapsed = time.monotonic() - started
     assert [digest(run) for run in runs] == alone
+    spent = 0.0
+    for run in runs:
+        with run.read() as store:
+            spent += sum(store.totals()[1:])
+    assert 0.3 * elapsed < spent < elapsed, "each has its share of the time, none has all"
     assert [[p.generation for p in t] for t in told] == [[0, 1, 2, 3, 4]] * 3
 
 
