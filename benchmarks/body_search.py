@@ -2,7 +2,7 @@
 
     python -m benchmarks.body_search                     # every search, five seeds; resumes
     python -m benchmarks.body_search --only critter walker --seeds 2
-    python -m benchmarks.body_search --draw benchmarks/figures/body_search.png
+    python -m benchmarks.body_search --draw curves.png
 
 Equal evaluations, physics, cycles and amplitudes; the fitness is `steady`, body diameters per cycle
 in the slower half of the measurement. Each search is a folder of runs, so that one that was stopped

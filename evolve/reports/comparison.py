@@ -132,6 +132,9 @@ def _labels(settings: Sequence[dict], configs: Sequence[RunConfig]) -> list[str]
     # The settings of another optimizer differ because it is another: its name says so.
     named = [key for key in first if len({repr(flat.get(key)) for flat in settings}) > 1]
     hidden = tuple(key.partition(".")[0] + "." for key in named)
+    differ = len({config.fixed_body for config in configs}) > 1
+    if differ:  # which body it is says its shape
+        hidden += tuple(key for key in keys if key.startswith("body.") and key != "body.shape")
     others = sorted(
         key
         for key in keys
@@ -142,7 +145,7 @@ def _labels(settings: Sequence[dict], configs: Sequence[RunConfig]) -> list[str]
     labels = []
     for flat, config in zip(settings, configs, strict=True):
         words = [str(flat[key]).replace("_", " ") for key in named]
-        if len({other.fixed_body for other in configs}) > 1:
+        if differ:
             words.append("fixed body" if config.fixed_body else "bodies evolve")
         words += [f"{key.rpartition('.')[2]} {flat[key]}" for key in others[:3] if key in flat]
         labels.append(", ".join(words) or config.name)

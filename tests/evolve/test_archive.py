@@ -92,7 +92,8 @@ def test_bodies_have_an_atlas_without_an_archive_and_controllers_have_none(run, 
         assert atlas(controllers, store) is None
     assert diversity(controllers).bodies is None
     evolving, fixed = groups([bodies, controllers])
-    assert evolving.label.endswith("bodies evolve") and fixed.label.endswith("fixed body")
+    assert evolving.label.startswith("age fitness, voxels, bodies evolve")
+    assert fixed.label.startswith("genetic, direct, fixed body")
 
 
 def test_the_diversity_of_bodies(run):
