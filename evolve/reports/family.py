@@ -86,8 +86,8 @@ def family(report: ws.Document, run: Run, store: Store, individual: int) -> None
     chart = figure(9.4, 4.4)
     family_tree(chart.subplots(), everybody, UNITS[run.config.task.fitness])
     words = f"The {len(everybody) - 1:,} ancestors of #{individual}, each bound to its parents."
-    report.row(report.plot(chart, words))
+    report.plot(chart, words)
     labels = [f"generation {one.generation}: #{one.id}   {one.fitness:.2f}" for one in shown]
     words = "Its line from parent to child, at the end of their trials: who was fitter than before."
     film = trial(run, store, [one.id for one in shown])
-    report.row(report.still(film, words, labels=labels))
+    report.still(film, words, labels=labels)

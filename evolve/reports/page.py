@@ -162,7 +162,7 @@ def _learning(
             "Best so far against evaluations: mean over seeds, shaded its standard error. "
             "A single seed has no error."
         )
-        report.row(report.plot(chart, words))
+        report.plot(chart, words)
     curve, dots = figure(8.0, 4.8), figure(8.0, 4.8)
     learning_curve(curve.subplots(), subject.record, fitness)
     dot_plot(dots.subplots(), subject.record, fitness)
@@ -184,6 +184,7 @@ def _learning(
 
 
 def _champion(report: ws.Document, subject: Subject) -> None:
+    import warp_springs as ws
 
     report.section("The best robot")
     robot = subject.film.robots[0]
@@ -193,19 +194,15 @@ def _champion(report: ws.Document, subject: Subject) -> None:
         f"It moves at {_speed_words(subject)}."
     )
     for pair in CHAMPION_PLOTS:
-        report.row(*(_champion_plot(report, subject, *plot) for plot in pair))
-
-
-def _champion_plot(report: ws.Document, subject: Subject, name: str, words: str) -> str:
-    import warp_springs as ws
-
-    page = figure(6.8, 4.3)
-    getattr(ws.plots, name)(page.subplots(), subject.film, 0)
-    return report.plot(page, words)
+        parts = []
+        for name, words in pair:
+            page = figure(6.8, 4.3)
+            getattr(ws.plots, name)(page.subplots(), subject.film, 0)
+            parts.append(report.plot(page, words))
+        report.row(*parts)
 
 
 def _zoo(report: ws.Document, subject: Subject) -> None:
-
     report.section("Zoo")
     labels = [f"#{i}   {subject.fitness(i):.2f}" for i in subject.zoo]
     apart = niches(subject.run.config)
@@ -215,7 +212,7 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
             f"The best, and {len(labels) - 1} good individuals that differ most from each other in "
             f"{_listed(apart)}, at the end of their trial."
         )
-    report.row(report.still(subject.film, words, labels=labels))
+    report.still(subject.film, words, labels=labels)
     if subject.finalists:
         report.table(
             [

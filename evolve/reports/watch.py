@@ -27,15 +27,13 @@ def watch(report: ws.Document, subject: Subject) -> None:
     report.row(*alone)
     if len(zoo) > 1:
         words = f"The {len(zoo)} best side by side, {cycles}."
-        report.row(report.film(film, words, range(len(zoo)), **part))
-    report.row(
-        report.player(
-            film,
-            "The best, to walk around.",
-            names={place: f"#{individual}" for place, individual in enumerate(zoo)},
-            custom_data=dict(enumerate(_page_facts(subject))),
-            title=f"{subject.run.config.name}: the best",
-        )
+        report.film(film, words, range(len(zoo)), **part)
+    report.player(
+        film,
+        "The best, to walk around.",
+        names={place: f"#{individual}" for place, individual in enumerate(zoo)},
+        custom_data=dict(enumerate(_page_facts(subject))),
+        title=f"{subject.run.config.name}: the best",
     )
 
 

@@ -100,6 +100,24 @@ def test_the_same_content_gives_the_same_bytes():
     assert document().html() == document().html()
 
 
+def test_a_figure_stands_where_it_was_made_or_in_its_row():
+    report = ws.Document("figures")
+    first = report.image(PNG, "first")
+    report.text("between")
+    second = report.image(PNG, "second")
+    third = report.image(PNG, "third")
+    report.row(third, first)
+    text = report.html()
+    order = ["between", "second</figcaption>", '<div class="row">', "third<", "first<"]
+    places = [text.index(words) for words in order]
+    assert places == sorted(places)
+    assert text.count("<figure>") == 3
+    for bad in (first, "<p>", ws.Document("another").image(PNG)):  # it is in a row already
+        with pytest.raises(ValueError, match="of this document returned, each once"):
+            report.row(second, bad)
+    assert report.html().count("<figure>") == 3
+
+
 def test_a_bad_path_is_refused(tmp_path):
     with pytest.raises(ValueError, match="html"):
         document().write(tmp_path / "report.pdf")

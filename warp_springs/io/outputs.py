@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 __all__ = ["checked_output", "written_beside"]
+
+_DRAFT = ".draft-"
 
 
 def checked_output(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Path:
@@ -38,9 +41,59 @@ def checked_output(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Pat
 def written_beside(path: Path) -> Iterator[Path]:
     """A path of the same name in a new folder beside; what is written there replaces ``path``.
 
-    If the block raises, or the process dies, ``path`` stays as it was.
+    If the block raises, or the process dies, ``path`` stays as it was. What killed processes left
+    is swept away by whoever writes into the same folder next.
     """
-    with tempfile.TemporaryDirectory(prefix=".draft-", dir=path.parent) as folder:
-        draft = Path(folder, path.name)
+    _sweep(path.parent)
+    with _new_folder(path.parent) as folder:
+        draft = folder / path.name
         yield draft
         draft.replace(path)
+
+
+@contextmanager
+def _new_folder(parent: Path) -> Iterator[Path]:
+    """A folder for drafts, locked by this process, so that nobody takes it for litter."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_DRAFT, dir=parent))
+        lock = _lock(folder, wait=True)
+        if folder.exists():  # nobody swept it away before it was locked
+            break
+        _unlock(lock)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        _unlock(lock)
+
+
+def _sweep(parent: Path) -> None:
+    """Remove the drafts of processes that are gone: the system took their locks back."""
+    for folder in parent.glob(f"{_DRAFT}*/"):
+        lock = _lock(folder, wait=False)
+        if lock is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+            _unlock(lock)
+
+
+def _lock(folder: Path, wait: bool) -> int | None:
+    """Lock a folder; None where another process has it, or nothing can be locked."""
+    try:
+        import fcntl
+    except ImportError:  # not on Windows: drafts of killed processes stay there
+        return None
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        os.close(handle)
+        return None
+    return handle
+
+
+def _unlock(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)

@@ -9,12 +9,12 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 from warp_springs.io.outputs import checked_output, written_beside
 from warp_springs.view.pages import exhibits
-from warp_springs.view.pages.player import SUFFIXES, asset
+from warp_springs.view.pages.player import SUFFIXES
+from warp_springs.view.pages.shell import filled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +32,16 @@ MOST_PAGE = 1_600_000
 
 _NAMED_GROUP = re.compile(r' id="[A-Za-z][\w.]*_\d+"')
 """Names that matplotlib gives to the parts of every figure, the same in each; nothing uses them."""
+
+
+class _Part:
+    """A figure of a document, by itself or in a row."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
 
 
 class Document:
@@ -54,7 +64,7 @@ class Document:
         self.title = title
         self.subtitle = subtitle
         self._sections: list[str] = []
-        self._body: list[str] = []
+        self._body: list[str | _Part] = []
         self._plots = 0
 
     # -- blocks, one below the other ---------------------------------------------------------------
@@ -118,32 +128,47 @@ class Document:
         )
         self._body.append(f'<div class="scroll"><table><tbody>{rows}</tbody></table></div>')
 
-    def row(self, *parts: str) -> None:
-        """What `plot`, `image`, `video` and `page` return, side by side where there is room."""
-        inside = "".join(parts)
+    def row(self, *parts: _Part) -> None:
+        """Put what `plot`, `image`, `video`, `page`, `film`, `player` and `still` returned side by
+        side where there is room; without a row each stands where it was made.
+
+        Raises:
+            ValueError: Something else is given, or a part is in a row already.
+        """
+        loose = {id(block) for block in self._body if isinstance(block, _Part)}
+        for part in parts:
+            if id(part) not in loose:
+                raise ValueError(
+                    f"row: got {str(part)[:40]!r}, expected parts that a plot, image, video, page, "
+                    "film, player or still of this document returned, each once"
+                )
+            loose.remove(id(part))
+        taken = {id(part) for part in parts}
+        self._body = [block for block in self._body if id(block) not in taken]
+        inside = "".join(map(str, parts))
         self._body.append(f'<div class="row">{inside}</div>' if len(parts) > 1 else inside)
 
-    # -- parts of a row ----------------------------------------------------------------------------
+    # -- figures, which a row may put side by side -------------------------------------------------
 
-    def plot(self, figure: Figure, caption: str = "") -> str:
+    def plot(self, figure: Figure, caption: str = "") -> _Part:
         """A matplotlib figure as an inline drawing; dense scatters should be rasterised."""
         self._plots += 1
         drawing = _svg(figure, f"plot {self._plots}")
-        return _figure(drawing, caption)
+        return self._put(drawing, caption)
 
-    def image(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "png") -> str:
+    def image(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "png") -> _Part:
         """A picture or an animation of a kind that browsers show: png, webp, gif, jpeg."""
         source = f"data:image/{kind};base64,{_base64(data)}"
-        return _figure(f'<img src="{source}" alt="{html.escape(caption)}">', caption)
+        return self._put(f'<img src="{source}" alt="{html.escape(caption)}">', caption)
 
-    def video(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "mp4") -> str:
+    def video(self, data: bytes | os.PathLike[str], caption: str = "", kind: str = "mp4") -> _Part:
         """A video of a kind that browsers play: mp4, webm."""
         source = f"data:video/{kind};base64,{_base64(data)}"
-        return _figure(
+        return self._put(
             f'<video src="{source}" controls autoplay loop muted playsinline></video>', caption
         )
 
-    def page(self, text: str, caption: str = "", printed: str = "") -> str:
+    def page(self, text: str, caption: str = "", printed: str = "") -> _Part:
         """A whole page, for example one of `ws.html_page`, in a frame that can do no harm.
 
         Args:
@@ -154,7 +179,7 @@ class Document:
         frame = f'<iframe sandbox="allow-scripts" loading="lazy" title="{html.escape(caption)}"'
         inside = f'{frame} srcdoc="{html.escape(text)}"></iframe>'
         note = f'<p class="printed">{html.escape(printed)}</p>' if printed else ""
-        return _figure(inside, caption, "page") + note
+        return self._put(inside, caption, "page", note)
 
     def film(
         self,
@@ -163,7 +188,7 @@ class Document:
         robots: int | Sequence[int] | None = None,
         start: float | None = None,
         duration: float | None = None,
-    ) -> str:
+    ) -> _Part:
         """A film of recorded robots; H.264 with the extra ``video``, else an animated picture.
 
         Args:
@@ -185,7 +210,7 @@ class Document:
         names: Mapping[int, str] | None = None,
         custom_data: Mapping[int, Mapping[str, Any]] | None = None,
         title: str = "",
-    ) -> str:
+    ) -> _Part:
         """The page of `ws.html_page` in a frame, with as many of the robots as keep it small.
 
         Args:
@@ -214,7 +239,7 @@ class Document:
         caption: str = "",
         robots: Sequence[int] | None = None,
         labels: Sequence[str] | None = None,
-    ) -> str:
+    ) -> _Part:
         """A picture of the last frame, each robot in a tile of its own.
 
         Args:
@@ -226,6 +251,13 @@ class Document:
         shown = list(result.recorded if robots is None else robots)
         return self.image(exhibits.still(result, shown, labels), caption, kind="webp")
 
+    def _put(self, inside: str, caption: str, kind: str = "", note: str = "") -> _Part:
+        start = f'<figure class="{kind}">' if kind else "<figure>"
+        below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+        part = _Part(f"{start}{inside}{below}</figure>{note}")
+        self._body.append(part)
+        return part
+
     # -- the end -----------------------------------------------------------------------------------
 
     def html(self) -> str:
@@ -234,12 +266,13 @@ class Document:
             f'<a href="#s{i}">{html.escape(title)}</a>'
             for i, title in enumerate(self._sections, start=1)
         )
-        return Template(asset("document.html")).substitute(
-            title=html.escape(self.title),
+        return filled(
+            "document",
+            title=self.title,
+            policy="img-src data:; media-src data:; script-src 'unsafe-inline'",
             subtitle=f"<p>{html.escape(self.subtitle)}</p>" if self.subtitle else "",
             contents=f'<nav aria-label="Sections">{entries}</nav>' if len(entries) > 1 else "",
-            style=asset("document.css"),
-            body="\n".join(self._body),
+            content="\n".join(map(str, self._body)),
         )
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -269,12 +302,6 @@ def _svg(figure: Figure, salt: str) -> str:
     drawing = text[text.index("<svg") :]
     drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.S)
     return _NAMED_GROUP.sub("", re.sub(r"\n\s*", "\n", drawing))
-
-
-def _figure(inside: str, caption: str, kind: str = "") -> str:
-    start = f'<figure class="{kind}">' if kind else "<figure>"
-    below = f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
-    return f"{start}{inside}{below}</figure>"
 
 
 def _cell(value: Cell) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import ipaddress
 import json
 import math
@@ -12,19 +11,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from string import Template
 from typing import Any
 
-from warp_springs.view.pages.player import asset
+from warp_springs.view.pages.shell import filled
 
 __all__ = ["LiveLine", "LiveServer"]
 
 SCRIPTS = ("page_camera.js", "page_plot.js", "live.js")
 LOOPBACK = "127.0.0.1"
+_LOADS = "img-src data:; connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'"
 _POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
-    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; "
-    "form-action 'none'"
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    f"frame-ancestors 'self'; {_LOADS}"
 )
 
 
@@ -71,10 +69,7 @@ class LiveServer:
 
     def __init__(self, title: str, address: str = LOOPBACK, port: int = 0) -> None:
         self._content = _Content()
-        script = "\n".join(map(asset, SCRIPTS))
-        shell = Template(asset("live.html")).substitute(
-            title=html.escape(title), style=asset("live.css"), script=script
-        )
+        shell = filled("live", title=title, policy=_LOADS, scripts=SCRIPTS)
         self.show()
         handler = type("Handler", (_Handler,), {"shell": shell.encode(), "content": self._content})
         kind = _Server6 if ":" in address else _Server

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import html
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 from warp_springs.checks import check_choice
 from warp_springs.io.outputs import checked_output, written_beside
+from warp_springs.view.pages.shell import filled
 
 if TYPE_CHECKING:
     from warp_springs.result import Result
@@ -92,18 +90,14 @@ def html_page(
     check_choice("color", color, COLORS)
     header, data = described(result, robots, names or {}, custom_data or {}, grid, spacing)
     header["look"] = {"color": color, "skin": bool(skin)}
-    return Template(asset("page.html")).substitute(
-        title=html.escape(title),
-        style=asset("page.css"),
-        script="\n".join(asset(f"page_{name}.js") for name in SCRIPTS),
+    return filled(
+        "page",
+        title=title,
+        policy="img-src data:",
+        scripts=[f"page_{name}.js" for name in SCRIPTS],
         header=_as_script(header),
         data=data,
     )
-
-
-def asset(name: str) -> str:
-    """The text of a file of the folder ``assets``."""
-    return files("warp_springs.view").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def _as_script(value: Mapping[str, Any] | Sequence[Any]) -> str:

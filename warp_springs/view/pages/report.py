@@ -103,14 +103,12 @@ def _watch(report: Document, result: Result, names: Mapping[int, str], title: st
     if several:
         films.append(report.film(result, f"{names[shown[0]]} alone.", shown[0]))
     report.row(*films)
-    report.row(
-        report.player(
-            result,
-            "The same, to walk around.",
-            shown,
-            names={i: names[i] for i in shown},
-            title=title,
-        )
+    report.player(
+        result,
+        "The same, to walk around.",
+        shown,
+        names={i: names[i] for i in shown},
+        title=title,
     )
 
 
