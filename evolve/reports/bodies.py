@@ -16,7 +16,9 @@ __all__ = ["shown", "spread_out", "various"]
 CANDIDATES = 512
 """How many of the best different individuals are considered."""
 SHARE = 0.4
-"""Share of the best fitness that an individual must have to be considered."""
+"""Share of the best fitness that makes an individual a good one."""
+FEW = 2
+"""For each that is shown, so many of the best are considered in any case."""
 
 
 def various(run: Run, store: Store, count: int) -> list[int]:
@@ -39,7 +41,9 @@ def various(run: Run, store: Store, count: int) -> list[int]:
     names = niches(run.config) or DESCRIPTORS
     values = np.stack([scores.descriptors[name] for name in names], axis=1)
     least = scores.fitness[0] * (SHARE if scores.fitness[0] > 0.0 else 1.0 / SHARE)
-    good = (scores.fitness >= least) & np.isfinite(values).all(axis=1)
+    # Where few are good, some that are less so: in an archive most kinds are slower than the best.
+    few = np.arange(len(best)) < FEW * count
+    good = ((scores.fitness >= least) | few) & np.isfinite(values).all(axis=1)
     good[0] = True
     chosen = spread_out(np.nan_to_num(values[good]), count)
     return [best[place] for place in np.flatnonzero(good)[chosen]]
