@@ -158,18 +158,20 @@ def _unpacked(blob: bytes, genome: int) -> Plan:
 def _apart(one: Plan, other: Plan) -> float:
     """Mean of what their springs have not in common: places, then genes of those in common."""
     size = max(one.extent, other.extent, 1e-9)
-    keys = [_keyed(plan, size) for plan in (one, other)]
-    common = keys[0].keys() & keys[1].keys()
-    shape = 1.0 - len(common) / max(len(keys[0].keys() | keys[1].keys()), 1)
-    if not common:
+    (ours, genes), (theirs, others) = (_keyed(plan, size) for plan in (one, other))
+    common, here, there = np.intersect1d(ours, theirs, assume_unique=True, return_indices=True)
+    shape = 1.0 - len(common) / max(len(ours) + len(theirs) - len(common), 1)
+    if not len(common):
         return shape
-    gap = np.array([np.abs(keys[0][key] - keys[1][key]) for key in common])
+    gap = np.abs(genes[here] - others[there])
     gap[:, PHASE] = 2.0 * np.minimum(gap[:, PHASE], 1.0 - gap[:, PHASE])
     return shape + (1.0 - shape) * min(float(2.0 * gap.mean()), 1.0)
 
 
-def _keyed(plan: Plan, size: float) -> dict[tuple[int, ...], np.ndarray]:
-    """Genes of the springs by the places of their middles, on a grid of a tenth of the size."""
+def _keyed(plan: Plan, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where springs are, on a grid of a tenth of the size, as different numbers; their genes."""
     places = plan.positions - [*plan.positions[:, :2].mean(axis=0), plan.positions[:, 2].min()]
-    middles = np.floor(places[plan.springs].mean(axis=1) / (0.1 * size)).astype(int)
-    return dict(zip(map(tuple, middles.tolist()), plan.genes.astype(np.float64), strict=True))
+    middles = np.floor(places[plan.springs].mean(axis=1) / (0.1 * size)).astype(np.int64) + 512
+    code = (middles[:, 0] * 1024 + middles[:, 1]) * 1024 + middles[:, 2]
+    code, first = np.unique(code, return_index=True)
+    return code, plan.genes[first].astype(np.float64)

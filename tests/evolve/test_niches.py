@@ -169,3 +169,19 @@ def test_bodies_learn_in_a_run(bodies):
     robots = run.encoding.express(generation.candidates.genomes)
     assert len({robot.topology for robot in robots}) <= 8
     assert run.optimizer.best_fitness > 0.0
+
+
+@pytest.mark.parametrize("name", ["novelty", "map_elites"])
+def test_bodies_are_told_apart_by_all_that_describes_them(name):
+    descriptors = ["diameter", "mass", "muscles", "symmetry", "footfall"]
+    optimizer = {"type": name, "descriptors": descriptors}
+    if name == "map_elites":
+        grid = {"bins": [4] * 5, "lowest": [0.1, 0.5, 0.0, 0.5, 0.0]}
+        optimizer |= grid | {"highest": [0.9, 4.0, 300.0, 1.0, 1.0]}
+    changes = {"population": 12, "generations": 3, "task.measure": 1.0, "optimizer": optimizer}
+    run = Search(load("critter", changes | {"encoding.mass_per_point": 0.05}))
+    while not run.finished:
+        generation = run.step()
+    found = generation.scores.descriptors
+    assert set(descriptors) <= set(found)
+    assert all(len(np.unique(found[one])) > 1 for one in descriptors)
