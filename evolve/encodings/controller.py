@@ -9,7 +9,7 @@ from pydantic import Field
 
 from evolve.encodings.actuation import ActuationSettings, muscles
 from evolve.encodings.base import EncodingSettings
-from evolve.encodings.fields import ArrayField
+from evolve.encodings.fields import ArrayField, squashed
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -40,18 +40,24 @@ class ControllerSettings(ActuationSettings):
     """Whether the hidden neurons remember what they were."""
     rate: float = Field(25.0, gt=0.0)
     """Readings a second [1/s]."""
+    response: float = Field(0.0, ge=0.0)
+    """Time in which muscles come to 63 % of what the network tells them [s]; 0 for at once."""
     far: float = Field(2.0, gt=0.0)
     """Distance of a goal that reads as 1, and of a light that reads as one half [m]."""
     amplitude: float = Field(0.25, gt=0.0, lt=1.0)
     """Largest change of a rest length, as a part of it."""
+    rhythm: float = Field(0.0, ge=0.0, lt=1.0)
+    """Largest amplitude of the rhythm that each group has of its own, under what the network adds,
+    as a part of the rest length; 0 for none."""
     mutation_step: float = Field(0.05, gt=0.0)
     """Standard deviation of a mutation, as a share of a gene's range: networks are touchy."""
 
 
 class ControllerEncoding(ArrayField):
-    """The weights of a `ws.Controller`, and for each group a mean rest length and a stiffness.
+    """The weights of a `ws.Controller`, and for each group a mean rest length, a stiffness, and, if
+    asked for, a rhythm.
 
-    With a symmetry mirrored springs share these two; the network stays free, for it is to tell left
+    With a symmetry mirrored springs share these; the network stays free, for it is to tell left
     from right.
     """
 
@@ -78,25 +84,33 @@ class ControllerEncoding(ArrayField):
             hidden=settings.hidden,
             recurrent=settings.recurrent,
             rate=settings.rate,
+            response=settings.response,
         )
         still = np.where(self.group < 0, body.amplitude, 0.0)
         self.body = body.replace(amplitude=still, omega=2.0 * np.pi / settings.period)
         self.body = self.body.controlled(brain)
         self.groups = brain.n_outputs
-        self.genome_shape = (brain.n_weights + 2 * self.groups,)
+        self._parts = 4 if settings.rhythm else 2
+        self.genome_shape = (brain.n_weights + self._parts * self.groups,)
 
     def express(self, genomes: np.ndarray) -> ws.Variants:
         """Build the robots: one body, n networks."""
-        genes, groups = self.coefficients(genomes), self.groups
-        weights, rest, hard = np.split(genes, [-2 * groups, -groups], axis=1)
-        (low, high), (soft, stiff) = self.settings.rest_length, self.settings.stiffness
-        own = self.group[self.own]
-        share = 0.5 + 0.5 * np.tanh(self.spread(hard[:, own]))
-        longer = 0.5 + 0.5 * np.tanh(self.spread(rest[:, own]))
+        genes, settings = self.coefficients(genomes), self.settings
+        (low, high), (soft, stiff) = settings.rest_length, settings.stiffness
+        weights, each = np.split(genes, [-self._parts * self.groups], axis=1)
+        each = each.reshape(len(genes), self._parts, self.groups)
+        rest, hard, *waves = np.moveaxis(each[:, :, self.group[self.own]], 1, 0)
+        rhythm = {}
+        if waves:
+            reach = settings.rhythm * self.body.lengths
+            phase = self.spread_phase(np.arctan2(*waves) / (2.0 * np.pi))
+            rhythm["amplitude"] = reach * np.tanh(self.spread(np.hypot(*waves)))
+            rhythm["phase"] = 2.0 * np.pi * phase
         return self.variants(
             weights=weights,
-            rest_length=self.body.lengths * (low + (high - low) * longer),
-            stiffness=soft * (stiff / soft) ** share,
+            rest_length=self.body.lengths * (low + (high - low) * squashed(self.spread(rest))),
+            stiffness=soft * (stiff / soft) ** squashed(self.spread(hard)),
+            **rhythm,
         )
 
     def _sensor(self, kind: str, centers: np.ndarray) -> ws.sensors.Sensor:

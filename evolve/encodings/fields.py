@@ -12,7 +12,7 @@ from evolve.encodings.base import ArrayGenomes, folded
 if TYPE_CHECKING:
     import warp_springs as ws
 
-__all__ = ["ArrayField", "FieldBody"]
+__all__ = ["ArrayField", "FieldBody", "squashed"]
 
 RANGE = 4.0
 """Coefficients lie between minus and plus this: far enough to saturate what they feed."""
@@ -31,7 +31,7 @@ class FieldBody(FixedBody):
         rest, cosine, sine, stiffness = np.moveaxis(np.asarray(fields, np.float64), 1, 0)
         amplitude = np.hypot(cosine, sine)
         phase = np.arctan2(sine, cosine) / (2.0 * np.pi)
-        return self.actuated(_squashed(rest), np.tanh(amplitude), phase, _squashed(stiffness))
+        return self.actuated(squashed(rest), np.tanh(amplitude), phase, squashed(stiffness))
 
 
 class ArrayField(FieldBody, ArrayGenomes):
@@ -76,6 +76,6 @@ class ArrayField(FieldBody, ArrayGenomes):
         return gap.reshape(len(a), -1).mean(axis=1) * (np.sqrt(np.pi) / 2.0)
 
 
-def _squashed(field: np.ndarray) -> np.ndarray:
+def squashed(field: np.ndarray) -> np.ndarray:
     """Real numbers into 0 to 1, 0 into the middle."""
     return 0.5 + 0.5 * np.tanh(field)

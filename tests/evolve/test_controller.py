@@ -45,6 +45,29 @@ def test_a_genome_is_the_weights_of_the_network_and_the_body_of_its_groups():
         assert np.ptp(np.log(stiffness)) < 1e-9
 
 
+def test_groups_have_a_rhythm_of_their_own_under_what_the_network_adds():
+    changes = {"encoding.rhythm": 0.2, "encoding.response": 0.1, "encoding.symmetry": "x"}
+    encoding = load("cube", SMALL | changes).make_encoding()
+    genomes = genomes_of(encoding, 5)
+    robots = encoding.express(genomes)
+    (brain,) = robots.body.elements.controllers
+    assert brain.response == 0.1 and encoding.genome_shape == (brain.n_weights + 4 * 4,)
+    amplitude = robots.stacked["amplitude"] / robots.body.lengths
+    assert 0.05 < amplitude.max() <= 0.2
+    for group in range(4):
+        own = np.intersect1d(np.flatnonzero(encoding.group == group), encoding.own)
+        for values in (amplitude[:, own], robots.stacked["phase"][:, own]):
+            assert np.abs(values - values[:, :1]).max(initial=0.0) < 1e-12
+    apart = np.sin(
+        robots.stacked["phase"] + 2 * np.pi * 0.5
+    )  # mirrored springs, half a cycle later
+    mirrored = np.setdiff1d(np.arange(28), encoding.own)
+    sines = np.sin(robots.stacked["phase"])
+    for spring in mirrored:
+        image = encoding.own[encoding._row[spring]]
+        np.testing.assert_allclose(sines[:, spring], apart[:, image], atol=1e-9)
+
+
 def test_the_same_robot_sees_the_goal_where_it_is():
     """Aimed at different goals it goes different ways, and its fitness is the mean of both."""
     config = load("cube", SEEING)

@@ -140,7 +140,8 @@ def test_muscles_obey_their_outputs(body):
 @pytest.mark.parametrize("layout", ["lanes", "flat", "block"])
 def test_splitting_and_looking_change_no_bit_and_layouts_agree(body, layout):
     scene = SCENES["ground"]
-    robots = [body.controlled(controller(body, seed=s)) for s in range(3)] + [body]
+    robots = [body.controlled(controller(body, seed=s, response=0.05 * s)) for s in range(3)]
+    robots.append(body)
     options = {"dt": DT, "threads": 2}
     whole = ws.Simulation(robots, scene, layout=layout, **options).run(0.4)
     simulation = ws.Simulation(robots, scene, layout=layout, **options)
@@ -196,9 +197,10 @@ def test_other_precisions_follow(body, precision):
     np.testing.assert_allclose(end.positions(0), exact.positions(0), atol=2e-4)
 
 
-def test_the_ledger_counts_the_work_of_the_muscles(body):
+@pytest.mark.parametrize("response", [0.0, 0.1])
+def test_the_ledger_counts_the_work_of_the_muscles(body, response):
     free = ws.Scene(gravity=(0, 0, 0), ground=None)
-    robot = body.controlled(controller(body))
+    robot = body.controlled(controller(body, response=response))
     residual = []
     for dt in (1e-3, 5e-4):
         energy = ws.Simulation(robot, free, dt=dt).run(0.4, fps=50, energy=True).energy
@@ -237,7 +239,53 @@ def test_what_does_not_fit_is_refused(body):
         body.replace(elements=ws.Elements(controllers=(made,)))
     with pytest.raises(ValueError, match="recurrent"):
         made.replace(hidden=0, weights=None)
+    with pytest.raises(ValueError, match=r"Controller.response: got -1"):
+        made.replace(response=-1)
     with pytest.raises(ValueError, match="full"):
         sensors.goal((0, 0, 0), full=0.0)
     with pytest.raises(ValueError, match="0 controllers"):
         body.variants(weights=np.zeros((2, 4)))
+
+
+def lagging(response, rate=RATE):
+    """Two masses in the void whose spring is told a constant, and follows with a lag."""
+    two = ws.Robot(masses=0.1, positions=[(0, 0, 0), (0.2, 0, 0)], springs=[(0, 1)], stiffness=50.0)
+    weights = [0, 0, 0.5]
+    made = ws.Controller([sensors.tilt()], [0], weights=weights, hidden=0, reach=0.3, rate=rate)
+    return two.controlled(made.replace(response=response))
+
+
+def stretch_of(t, response):
+    """How much longer the spring of `lagging` is: an oscillator driven by a lag, in closed form."""
+    target, w2 = 0.2 * 0.3 * np.tanh(0.5), 50.0 * 2 / 0.1
+    w, e = np.sqrt(w2), np.exp(-t / response)
+    part = -w2 / (w2 + response**-2)  # of exp(-t / response) in y'' = w2 (1 - exp(...) - y)
+    return target * (
+        1 + part * e - (1 + part) * np.cos(w * t) + part / (response * w) * np.sin(w * t)
+    )
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat", "block"])
+@pytest.mark.parametrize("precision", ["float64", "float32", "mixed"])
+def test_muscles_follow_with_the_lag_of_a_first_order(layout, precision):
+    free = ws.Scene(gravity=(0, 0, 0), ground=None)
+    simulation = ws.Simulation(
+        lagging(0.08), free, dt=DT, layout=layout, precision=precision, integrator="leapfrog"
+    )
+    found = []
+    for _ in range(8):
+        x = simulation.run(0.05).positions(0)
+        found.append(np.linalg.norm(x[1] - x[0]) - 0.2)
+    expected = stretch_of(0.05 * np.arange(1, 9), 0.08)
+    assert np.abs(expected).max() > 0.02
+    np.testing.assert_allclose(found, expected, atol=2e-4)
+
+
+def test_a_lag_is_the_same_at_half_the_step_and_at_any_rate():
+    free = ws.Scene(gravity=(0, 0, 0), ground=None)
+    ends = [
+        ws.Simulation(lagging(0.08, rate), free, dt=dt).run(0.4).positions(0)
+        for rate, dt in [(25.0, 1e-3), (25.0, 5e-4), (5.0, 1e-3), (250.0, 1e-3)]
+    ]
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], atol=2e-4)

@@ -22,8 +22,9 @@ class Controller:
 
     Hidden neurons are tanh of a weighted sum of the readings, of 1, and, in a recurrent network, of
     what they were the time before; outputs are tanh of a weighted sum of the hidden neurons and
-    of 1, or of the readings and 1 where there are none. Between two readings a muscle keeps the
-    mean rest length ``rest_length (1 + reach output)``; a rhythm of its own comes on top.
+    of 1, or of the readings and 1 where there are none. A muscle has the mean rest length
+    ``rest_length (1 + reach a)``; a rhythm of its own comes on top. Its activation a is the output
+    of the latest reading, or follows it with a lag, ``response da/dt = output - a`` from a = 0 on.
 
     Attributes:
         sensors: What it reads, in this order: see `ws.sensors`.
@@ -36,6 +37,8 @@ class Controller:
         hidden: Hidden neurons H, 0 for a network of one layer.
         recurrent: Whether the hidden neurons remember.
         rate: Readings a second [1/s]; rounded so that whole steps lie between them.
+        response: Time in which activations come to 63 % of a new output [s]; 0 for at once. They
+            change in steps of an eighth of it, or less, each the mean of the lag over its time.
         frame: Set by `Robot.controlled`: parts by which the masses make up the centre of mass,
             forward and left, shape (3, M).
 
@@ -51,6 +54,7 @@ class Controller:
     hidden: int = 8
     recurrent: bool = False
     rate: float = 20.0
+    response: float = 0.0
     frame: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -70,6 +74,7 @@ class Controller:
             raise ValueError("Controller.muscles: a spring is named twice")
         check_number("Controller.rate", self.rate, above=0.0)
         check_number("Controller.reach", self.reach, above=0.0)
+        check_number("Controller.response", self.response, at_least=0.0)
         if self.reach >= 1.0:
             raise ValueError(f"Controller.reach: got {self.reach!r}, expected less than 1")
         if isinstance(self.hidden, bool) or int(self.hidden) != self.hidden or self.hidden < 0:
@@ -162,7 +167,8 @@ class Controller:
     def _values(self) -> tuple:
         frame = None if self.frame is None else (self.frame + 0.0).tobytes()
         network = (self.hidden, self.recurrent, (self.weights + 0.0).tobytes())
-        return (self.sensors, self.muscles, self.outputs, *network, self.reach, self.rate, frame)
+        pace = (self.reach, self.rate, self.response)
+        return (self.sensors, self.muscles, self.outputs, *network, *pace, frame)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Controller) and self._values() == other._values()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,9 +26,39 @@ if TYPE_CHECKING:
 
 __all__ = ["Pilot", "Reach", "pilots"]
 
+#: Steps of the activations in the time of a response, at least.
+_FINENESS = 8
 #: Energies that a change of rest lengths changes: kinetic, by the half kick that belongs to the
 #: step before, and that of the springs.
 _CHANGED = (0, 2)
+
+
+@dataclass(frozen=True)
+class Pace:
+    """When controllers read, and how their muscles follow.
+
+    Attributes:
+        every: Steps from one reading to the next.
+        follow: Steps from one change of the activations to the next, a part of ``every``.
+        left: Part of the difference from the output that is left after that time.
+        mean: The same on average over that time.
+    """
+
+    every: int
+    follow: int
+    left: float
+    mean: float
+
+
+def pace(controller: Controller, dt: float) -> Pace:
+    """The pace of a controller at a step of ``dt``: its rate, rounded to whole steps."""
+    every, response = max(1, round(1.0 / (controller.rate * dt))), controller.response
+    if response == 0.0:
+        return Pace(every, every, 0.0, 0.0)
+    turns = min(every, math.ceil(_FINENESS / (controller.rate * response)))
+    follow = round(every / turns)
+    time = follow * dt / response
+    return Pace(turns * follow, follow, math.exp(-time), -math.expm1(-time) / time)
 
 
 @dataclass(frozen=True)
@@ -124,21 +155,21 @@ class Pilot:
         self._members = np.array(members)
         self.outputs = tables.outputs
         self._groups = []
-        for every, rows in sorted(tables.grouped(dt).items()):
-            chosen = self._chosen(kernel, reach, tables.brains[rows])
+        for pace, rows in tables.grouped(dt).items():
+            chosen = self._chosen(kernel, reach, tables.brains[rows], pace)
             bundles = np.unique(batch.slots.bundle[tables.owner[rows]]).astype(np.int32)
             which = wp.array(bundles, dtype=wp.int32, device="cpu")
-            self._groups.append((every, chosen, which))
+            self._groups.append((pace, chosen, which))
 
-    def _chosen(self, kernel: wp.Kernel, reach: Reach, brains: np.ndarray) -> wp.Launch:
-        """The launch of the controllers of one rate."""
+    def _chosen(self, kernel: wp.Kernel, reach: Reach, brains: np.ndarray, pace: Pace) -> wp.Launch:
+        """The launch of the controllers of one pace."""
         tables = control_struct()()
         for name in TABLES:
             setattr(tables, name, getattr(self._tables, name))
         device = self._piece.place
         tables.brains = wp.array(brains.ravel(), dtype=wp.int64, device=device)
         seen = [reach.seen[name] for name in ("positions", "velocities", "states")]
-        inputs = [tables, *seen, 0.0]
+        inputs = [tables, *seen, 0.0, False, pace.left, pace.mean]
         return wp.launch(
             kernel,
             len(brains),
@@ -155,15 +186,17 @@ class Pilot:
 
     def until(self, step: int) -> int:
         """Set the muscles whose time has come at a step; the step when the next will be due."""
-        for every, launch, which in self._groups:
-            if step % every == 0:
-                self._run(step, launch, which)
-        return min((step // every + 1) * every for every, _, _ in self._groups)
+        for pace, launch, which in self._groups:
+            if step % pace.follow == 0:
+                self._run(step, step % pace.every == 0, launch, which)
+        return min((step // pace.follow + 1) * pace.follow for pace, _, _ in self._groups)
 
-    def _run(self, step: int, launch: wp.Launch, which: wp.array) -> None:
-        self._piece.observe(step, which)
+    def _run(self, step: int, reading: bool, launch: wp.Launch, which: wp.array) -> None:
+        if reading or self._ledger:
+            self._piece.observe(step, which)
         before = self._energies() if self._ledger else 0.0
         launch.set_param_by_name("now", step * self._dt)
+        launch.set_param_by_name("reads", reading)
         launch.launch()
         if self._ledger:
             self._piece.observe(step, which)
@@ -194,21 +227,23 @@ class _Tables:
         self._ranks: dict[bytes, np.ndarray] = {}
         self._kept: list[Controller] = []  # an id is its owner's only while the owner lives
         self.outputs: dict[int, tuple[int, int]] = {}
-        rows, rates, owner = [], [], []
+        rows, self._controllers, owner = [], [], []
         for index, place, cells in zip(members, reach.place, reach.cells, strict=True):
             start = self._sizes["signals"]
             for controller in loops.of(index):
                 rows.append(self._row(loops, index, controller, place, cells))
-                rates.append(controller.rate)
+                self._controllers.append(controller)
                 owner.append(index)
             self.outputs[index] = start, self._sizes["signals"]
         self.brains = np.array(rows, np.int64)
-        self.owner, self._rates = np.array(owner), np.array(rates)
+        self.owner = np.array(owner)
 
-    def grouped(self, dt: float) -> dict[int, np.ndarray]:
-        """Steps from one reading to the next -> rows of the table of controllers."""
-        every = np.maximum(1, np.rint(1.0 / (self._rates * dt))).astype(np.int64)
-        return {int(steps): np.flatnonzero(every == steps) for steps in np.unique(every)}
+    def grouped(self, dt: float) -> dict[Pace, list[int]]:
+        """Rows of the table of controllers, by their pace, the hastiest first."""
+        found = defaultdict(list)
+        for row, controller in enumerate(self._controllers):
+            found[pace(controller, dt)].append(row)
+        return {key: found[key] for key in sorted(found, key=lambda p: (p.every, p.follow, p.left))}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """All tables by name."""
@@ -252,6 +287,7 @@ class _Tables:
             "memory": self._add("memories", np.zeros(2 * hidden)),
             "reading": self._add("readings", np.zeros(controller.n_readings)),
             "signal": self._add("signals", np.zeros(controller.n_outputs)),
+            "activation": self._add("activations", np.zeros(2 * controller.n_outputs)),
             "muscle": self._add("muscles", table) // 3,
             "muscles": len(muscles),
         }

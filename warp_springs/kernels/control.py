@@ -1,5 +1,7 @@
 """Closed loops: one thread reads the sensors of one controller, computes its network and sets the
-rest lengths of its muscles, between two steps and for every layout.
+rest lengths of its muscles, between two steps and for every layout. Between two readings it lets
+the muscles follow: each activation comes nearer to its signal, and each rest length is that of the
+mean activation until the next change.
 
 It reads what a look writes, which is the same for all layouts, and writes the coefficient
 ``h = k L0 / 2`` of each muscle wherever its layout keeps it. All arithmetic is in float64 and in an
@@ -38,6 +40,7 @@ BRAIN = (
     "signal",
     "muscle",  # its first, and how many
     "muscles",
+    "activation",  # one for each output
 )
 #: Columns of the table of sensors: kind, first entry of the list of what it sits on, how many.
 SENSOR = ("kind", "first", "count")
@@ -60,11 +63,17 @@ TABLES = {
     "memories": np.float64,
     "readings": np.float64,
     "signals": np.float64,
+    "activations": np.float64,  # what the muscles do of a signal, so far
 }
 
-_CONTROL = r"""
+_BRAIN = r"""
 const int64_t* const brain = tables.brains.data + BRAIN_COLUMNS * (int64_t)index;
 if (states.data[brain[2]] != 0) return;  // a robot that was stopped
+const int64_t hidden = brain[8], outputs = brain[10];
+double* const signal = tables.signals.data + brain[14];
+"""
+
+_SENSE = r"""
 const int64_t place = brain[0], stride = brain[1], masses = brain[3];
 auto component = [&](const shown* of, int64_t i, int c) -> double {
     return double(of[place + (3 * i + c) * stride]);
@@ -161,12 +170,12 @@ for (int64_t s = brain[5]; s < brain[5] + brain[6]; ++s) {
         read(::cos(angle));
     }
 }
+"""
 
-const int64_t hidden = brain[8], outputs = brain[10];
+_THINK = r"""
 const double* weight = tables.weights.data + brain[11];
 double* const memory = tables.memories.data + brain[12];
 double* const next = memory + hidden;
-double* const signal = tables.signals.data + brain[14];
 auto weighed = [&](const double* from, int64_t count) -> double {
     double sum = 0.0;
     for (int64_t i = 0; i < count; ++i) sum += *weight++ * from[i];
@@ -182,12 +191,20 @@ for (int64_t j = 0; j < outputs; ++j) {
     const double sum = hidden ? weighed(memory, hidden) : weighed(reading, filled);
     signal[j] = ::tanh(sum + *weight++);
 }
+"""
+
+_FOLLOW = r"""
+double* const activation = tables.activations.data + brain[17];
 for (int64_t m = brain[15]; m < brain[15] + brain[16]; ++m) {
     const int64_t* const muscle = tables.muscles.data + 3 * m;
     const double* const strength = tables.strengths.data + 2 * m;
-    const double h = strength[0] + strength[1] * signal[muscle[0]];
+    const double target = signal[muscle[0]];
+    const double a = target + mean * (activation[muscle[0]] - target);
+    const double h = strength[0] + strength[1] * a;
     coefficients.data[muscle[1]] = coefficients.data[muscle[2]] = (coefficient)h;
 }
+for (int64_t j = 0; j < outputs; ++j)
+    activation[j] = signal[j] + left * (activation[j] - signal[j]);
 """
 
 
@@ -219,7 +236,8 @@ def _text(precision: str, ground: bool, obstacles: int) -> str:
     real = "double" if real_dtype(precision).itemsize == 8 else "float"
     seen = "double" if wide_dtype(precision).itemsize == 8 else "float"
     lines += [f"typedef {real} coefficient; typedef {seen} shown;"]
-    return scalar_dialect("float64") + flags + "\n".join(lines) + LAW + _CONTROL
+    work = f"{_BRAIN}if (reads) {{{_SENSE}{_THINK}}}{_FOLLOW}"
+    return scalar_dialect("float64") + flags + "\n".join(lines) + LAW + work
 
 
 @functools.cache
@@ -245,6 +263,9 @@ def control(precision: str, ground: bool, obstacles: int) -> wp.Kernel:
         states: wp.array(dtype=wp.int32),
         coefficients: wp.array(dtype=real),
         now: wp.float64,
+        reads: wp.bool,
+        left: wp.float64,
+        mean: wp.float64,
         index: int,
     ): ...
 
@@ -255,9 +276,13 @@ def control(precision: str, ground: bool, obstacles: int) -> wp.Kernel:
         velocities: wp.array(dtype=wide),
         states: wp.array(dtype=wp.int32),
         now: wp.float64,
+        reads: wp.bool,
+        left: wp.float64,
+        mean: wp.float64,
         # outputs
         coefficients: wp.array(dtype=real),
     ):
-        work(tables, positions, velocities, states, coefficients, now, wp.tid())
+        i = wp.tid()
+        work(tables, positions, velocities, states, coefficients, now, reads, left, mean, i)
 
     return set_muscles
