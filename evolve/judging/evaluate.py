@@ -46,7 +46,7 @@ class Evaluator:
         """Names of all that must be known of a trial."""
         self.simulation = config.simulation
         self.scene = config.scene.build()
-        self._scenery = config.scene
+        self._scenery: SceneConfig | None = config.scene
         self._goals = config.task.goals or (None,)
         self.streams = Streams(config.seed)
         self.period = config.encoding.period
@@ -69,24 +69,31 @@ class Evaluator:
 
     def _starts(self, robots: Sequence[ws.Robot]) -> Iterator[tuple[Sequence[ws.Robot], ws.Scene]]:
         """The robots and their world in each of the trials: a floor and starts of its own."""
+        settings, worlds = self.task.trials, self._worlds()
+        if len(worlds) == 1:
+            yield robots, worlds[0]
+            return
+        yield from zip(
+            scattered(robots, settings, self.streams, settings.count), worlds, strict=True
+        )
+
+    def _worlds(self) -> list[ws.Scene]:
+        """The world of each of the trials."""
         settings = self.task.trials
         if settings.count == 1:
-            yield robots, self.scene
-            return
-        starts = scattered(robots, settings, self.streams, settings.count)
-        spread = np.linspace(-settings.friction, settings.friction, settings.count)
-        for trial, (start, change) in enumerate(zip(starts, spread, strict=True)):
-            scene = _of_next_seeds(self._scenery, trial * settings.terrain).build()
-            yield start, _rougher(scene, 1.0 + float(change))
+            return [self.scene]
+        scenes = [self.scene] * settings.count
+        if settings.terrain and self._scenery is not None:
+            scenes = [_of_next_seeds(self._scenery, trial).build() for trial in range(len(scenes))]
+        spread = np.linspace(-settings.friction, settings.friction, len(scenes))
+        return [_rougher(s, 1.0 + float(change)) for s, change in zip(scenes, spread, strict=True)]
 
     def _mean(self, trials: Sequence[Scores]) -> Scores:
         """One score for each robot from those of its trials."""
         status = np.stack([trial.status for trial in trials])
         first = np.argmax(status != 0, axis=0)
         return Scores(
-            fitness=aggregate(
-                np.stack([trial.fitness for trial in trials]), self.task.trials.aggregate
-            ),
+            fitness=self._together([trial.fitness for trial in trials]),
             status=np.take_along_axis(status, first[None], axis=0)[0],
             descriptors={
                 name: np.mean([trial.descriptors[name] for trial in trials], axis=0)
@@ -116,9 +123,9 @@ class Evaluator:
         )
 
     def within(self, scene: ws.Scene) -> Evaluator:
-        """The same trial in another world."""
+        """The same trials in another world, the same ground in all of them."""
         other = copy.copy(self)
-        other.scene = scene
+        other.scene, other._scenery = scene, None
         return other
 
     def prepare(self, robots: Sequence[ws.Robot]) -> None:
@@ -126,11 +133,12 @@ class Evaluator:
         self._simulate(robots)
 
     def second_look(self, robots: Sequence[ws.Robot], fitness: np.ndarray) -> SecondLook:
-        """Repeat the trial at half the time step in float64, and from perturbed starts.
+        """Repeat the trials at half the time step in float64, and from perturbed starts.
 
         Each robot takes half its own step, or half its longest stable one if that is less; robots
         of the same step run in one simulation. The perturbed trials of all robots run in another,
-        as the first trial ran but for the starts.
+        as the first trial ran but for the starts; where there are several trials, in the world of
+        each of them in turn.
 
         Args:
             robots: n robots.
@@ -142,19 +150,33 @@ class Evaluator:
         for step in np.unique(dt):
             alike = np.flatnonzero(dt == step)
             some = [robots[i] for i in alike]
-            halved[alike] = self._looked(some, some, float(step), "float64")
-        starts = [
-            start
-            for robot in robots
-            for start in perturbed(robot, settings, self.streams, Role.SECOND_LOOK, settings.trials)
-        ]
-        # The fitness measures a robot as it was built, not as it was bent for the start.
-        built = [robot for robot in robots for _ in range(settings.trials)]
-        trials = self._looked(starts, built)
-        usual = quantile(trials.reshape(len(robots), settings.trials), settings.quantile)
+            found = [
+                self._looked(starts, some, scene, float(step), "float64")
+                for starts, scene in self._starts(some)
+            ]
+            halved[alike] = self._together(found)
+        trials = self._perturbed(robots)
+        usual = quantile(trials, settings.quantile)
         kept = share(halved, fitness), share(usual, fitness)
         survives = (kept[0] >= settings.threshold) & (kept[1] >= settings.threshold)
         return SecondLook(dt, halved, kept[0], usual, kept[1], survives)
+
+    def _perturbed(self, robots: Sequence[ws.Robot]) -> np.ndarray:
+        """Fitness of robots from perturbed starts, shape (N, trials)."""
+        settings, worlds = self.task.second_look, self._worlds()
+        count = settings.trials
+        starts = [
+            list(perturbed(robot, settings, self.streams, Role.SECOND_LOOK, count))
+            for robot in robots
+        ]
+        fitness = np.empty((len(robots), count))
+        for first, scene in enumerate(worlds[:count]):
+            mine = range(first, count, len(worlds))
+            some = [own[trial] for own in starts for trial in mine]
+            # The fitness measures a robot as it was built, not as it was bent for the start.
+            built = [robot for robot in robots for _ in mine]
+            fitness[:, mine] = self._looked(some, built, scene).reshape(len(robots), -1)
+        return fitness
 
     def _doubtless_steps(self, robots: Sequence[ws.Robot]) -> np.ndarray:
         """Half the step of each robot, or of its longest stable one if that is less, (N,) [s].
@@ -203,17 +225,20 @@ class Evaluator:
         self,
         starts: Sequence[ws.Robot],
         built: Sequence[ws.Robot],
+        scene: ws.Scene,
         dt: float | None = None,
         precision: str | None = None,
     ) -> np.ndarray:
-        """Fitness of robots at a second look, shape (N,), over all goals."""
-        found = [
-            self._fitness(
-                self._trial(self._simulate(self._aimed(starts, goal), dt, precision), built, goal)
-            )
-            for goal in self._goals
-        ]
-        return found[0] if len(found) == 1 else aggregate(found, self.task.trials.aggregate)
+        """Fitness of robots at a second look in a world, shape (N,), over all goals."""
+        found = []
+        for goal in self._goals:
+            simulation = self._simulate(self._aimed(starts, goal), dt, precision, scene)
+            found.append(self._fitness(self._trial(simulation, built, goal)))
+        return self._together(found)
+
+    def _together(self, fitness: Sequence[np.ndarray]) -> np.ndarray:
+        """One fitness for each robot from those of several trials."""
+        return fitness[0] if len(fitness) == 1 else aggregate(fitness, self.task.trials.aggregate)
 
     def _aimed(self, robots: Sequence[ws.Robot], goal: Place | None) -> Sequence[ws.Robot]:
         """The robots with a goal that their sensors look for."""

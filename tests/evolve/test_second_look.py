@@ -127,6 +127,21 @@ def test_trials_without_perturbation_repeat_the_first_look():
     assert (ours != Evaluator(another).second_look(robots, first).perturbed).all()
 
 
+def test_several_trials_are_repeated_all_on_the_hills_of_each():
+    hills = {"type": "rough", "seed": 3, "height": 0.05, "feature": 0.3, "size": 3.0}
+    several = {"task.trials.count": 2, "scene.ground": False, "scene.obstacles": [hills]}
+    coarse = load("cube", TINY | NO_PERTURBATION | several | {"task.second_look.trials": 3})
+    fine = load("cube", TINY | several | {"simulation.dt": coarse.simulation.dt / 2})
+    robots = some_robots(coarse, 3)
+    look = Evaluator(coarse).second_look(robots, Evaluator(coarse)(robots).fitness)
+    np.testing.assert_array_equal(look.halved, Evaluator(fine)(robots).fitness)
+    alone = []
+    for seed in (3, 4):
+        one = {"scene.ground": False, "scene.obstacles": [hills | {"seed": seed}]}
+        alone.append(Evaluator(load("cube", TINY | one))(robots).fitness)
+    np.testing.assert_allclose(look.perturbed, np.median([alone[0], *alone], axis=0), rtol=1e-9)
+
+
 def test_perturbed_starts_are_small_different_and_stand_on_the_ground():
     settings = SecondLookConfig(trials=50)
     robot = ws.shapes.cube(edge=0.2).moved((1.0, 2.0, 0.0)).moving((0.5, 0.0, 0.0))
