@@ -1,12 +1,9 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -15,9 +12,8 @@ from evolve.errors import RunError, StoreError
 from evolve.lock import Lock
 from evolve.run import Run
 from evolve.search import Search
-from evolve.store import Store
 from evolve.toml import load
-from tests.evolve.conftest import TINY, command, environment, flags
+from tests.evolve.conftest import TINY, environment
 
 
 def digest(run: Run) -> str:
@@ -179,50 +175,3 @@ def test_the_second_look_may_be_configured_afterwards(finished, tmp_path):
     assert run.config.task.second_look.trials == 3
     assert run.evolve()
     assert digest(run) == digest(finished)
-
-
-LONG = TINY | {"generations": 14, "population": 64}
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory) -> Run:
-    return evolved(load("cube", LONG), tmp_path_factory.mktemp("runs") / "undisturbed")
-
-
-@pytest.mark.parametrize("moment", range(4))
-def test_sigkill_at_a_random_moment_changes_nothing(undisturbed, moment, tmp_path):
-    # Real processes and real kills: the first between the making of the folder and the end of the
-    # first generation, the others whenever; the last one possibly while the exports are written.
-    folder = tmp_path / "run"
-    rng = np.random.Generator(np.random.Philox([moment, os.getpid()]))
-    arguments = command("run", "cube", *flags(LONG), "--out", folder)
-    kills = 0
-    for _ in range(3):
-        process = subprocess.Popen(
-            arguments, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-        )
-        wait_for_folder(folder, process)
-        time.sleep(rng.uniform(0.0, 0.05) if not kills and moment == 0 else rng.uniform(0.0, 1.2))
-        process.send_signal(signal.SIGKILL)
-        output = process.communicate()[0].decode()
-        kills += process.returncode == -signal.SIGKILL
-        assert process.returncode in (0, -signal.SIGKILL), output
-        arguments = command("resume", folder)
-    last = subprocess.run(arguments, env=environment(), capture_output=True, text=True, check=False)
-    assert last.returncode == 0, last.stderr
-    assert kills
-    assert digest(Run.open(folder)) == digest(undisturbed)
-    names = {path.name for path in folder.iterdir()}
-    expected = {"champion.usdc", "zoo.usdc", "zoo.png", "learning_curve.png", "dot_plot.png"}
-    assert expected <= names
-    assert not [name for name in names if name.startswith((".draft-", ".usd-"))]
-    with Store.open(folder / "run.sqlite") as store:
-        assert len(store.finalists()) == 32
-
-
-def wait_for_folder(folder, process) -> None:
-    """Wait until there is something to kill: before that a run has not begun."""
-    until = time.monotonic() + 60.0
-    while not (folder / "run.toml").exists() and process.poll() is None:
-        assert time.monotonic() < until
-        time.sleep(0.001)
