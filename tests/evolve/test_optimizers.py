@@ -7,7 +7,9 @@ from evolve.encodings import ArrayGenomes
 from evolve.judging.scores import Scores
 from evolve.optimizers import NOBODY, OPTIMIZERS, Individuals, Optimizer
 from evolve.optimizers.selection import SelectionSettings, select
+from evolve.search import Search
 from evolve.streams import Streams
+from evolve.toml import load
 
 LEARNERS = [name for name in OPTIMIZERS if name not in ("random", "coevolution")]
 """Two populations have no best of all: see test_coevolution."""
@@ -81,7 +83,7 @@ def sphere(genomes: np.ndarray) -> Scores:
     return Scores(fitness, (genomes[:, 0] > 0.9).astype(int), descriptors)
 
 
-def search(optimizer: Optimizer, generations: int, n: int = 40) -> list[Individuals]:
+def solve(optimizer: Optimizer, generations: int, n: int = 40) -> list[Individuals]:
     history = []
     for _ in range(generations):
         candidates = optimizer.ask(n)
@@ -95,17 +97,40 @@ def search(optimizer: Optimizer, generations: int, n: int = 40) -> list[Individu
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_every_optimizer_beats_random_search(name, seed):
     optimizer, baseline = make(name, seed), make("random", seed)
-    search(optimizer, 60, n=20)
-    search(baseline, 60, n=20)
+    solve(optimizer, 60, n=20)
+    solve(baseline, 60, n=20)
     assert optimizer.evaluations == baseline.evaluations == 1200
     assert optimizer.best_fitness > 0.5 * baseline.best_fitness  # of negative numbers
+
+
+def best_robot(name: str) -> float:
+    """Fitness of the best cube that an optimizer finds in 960 evaluations."""
+    changes = {"population": 24, "generations": 40, "encoding.type": "fourier"}
+    changes |= {"encoding.waves": 2, "simulation.dt": 1e-3, "optimizer.type": name, "seed": 2}
+    if name == "steady_state":
+        changes["optimizer.living"] = 24
+    search = Search(load("cube", changes))
+    while not search.finished:
+        search.step()
+    assert search.optimizer.evaluations == 960
+    return search.optimizer.best_fitness
+
+
+@pytest.fixture(scope="module")
+def random_robot() -> float:
+    return best_robot("random")
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_every_optimizer_beats_random_search_on_a_robot(name, random_robot):
+    assert best_robot(name) > 1.1 * random_robot
 
 
 @pytest.mark.parametrize("name", OPTIMIZERS)
 def test_a_restored_optimizer_continues_with_the_same_bits(name):
     whole, first, second = make(name), make(name), make(name)
-    everything = search(whole, 9)
-    before = search(first, 4)
+    everything = solve(whole, 9)
+    before = solve(first, 4)
     everybody = {int(i): (h, k) for h in before for k, i in enumerate(h.ids)}
 
     def recall(ids):
@@ -116,7 +141,7 @@ def test_a_restored_optimizer_continues_with_the_same_bits(name):
         )
 
     second.restore({k: v.copy() for k, v in first.state().items()}, recall)
-    after = search(second, 5)
+    after = solve(second, 5)
     for a, b in zip(everything, before + after, strict=True):
         np.testing.assert_array_equal(a.ids, b.ids)
         np.testing.assert_array_equal(a.genomes, b.genomes)
@@ -128,7 +153,7 @@ def test_a_restored_optimizer_continues_with_the_same_bits(name):
 @pytest.mark.parametrize("name", OPTIMIZERS)
 def test_the_bookkeeping(name):
     optimizer = make(name)
-    history = search(optimizer, 6)
+    history = solve(optimizer, 6)
     ids = np.concatenate([h.ids for h in history])
     worth = np.concatenate([h.scores.worth for h in history])
     np.testing.assert_array_equal(ids, np.arange(1, 241))
@@ -174,9 +199,9 @@ def test_a_score_of_a_stopped_robot_never_counts():
 
 def test_elites_stay_and_are_not_asked_for_again():
     optimizer = make("genetic", elites=0.1, mutation_rate=1.0)
-    search(optimizer, 1, n=50)
+    solve(optimizer, 1, n=50)
     best = optimizer.state()["survivors"][:5]
-    search(optimizer, 1, n=50)
+    solve(optimizer, 1, n=50)
     survivors = optimizer.state()["survivors"]
     assert len(survivors) == 50
     better = optimizer.state()["survivors"][:5]
@@ -186,10 +211,10 @@ def test_elites_stay_and_are_not_asked_for_again():
 
 def test_one_hill_climber_moves_to_the_best_of_its_mutants():
     optimizer = make("hill_climber", climbers=1)
-    search(optimizer, 1)
+    solve(optimizer, 1)
     for _ in range(5):
         at = optimizer._survivors
-        told = search(optimizer, 1)[0]
+        told = solve(optimizer, 1)[0]
         best = int(np.argmax(told.scores.worth))
         better = told.scores.worth[best] >= at.scores.worth[0]
         expected = told.ids[best] if better else at.ids[0]
@@ -201,7 +226,7 @@ def test_hill_climbers_never_step_down():
     optimizer = make("hill_climber")
     worth = np.full(40, -np.inf)
     for _ in range(6):
-        told = search(optimizer, 1)[0].scores.worth
+        told = solve(optimizer, 1)[0].scores.worth
         climbed = optimizer._survivors.scores.worth
         np.testing.assert_array_equal(climbed, np.maximum(worth, told))
         worth = climbed
@@ -282,14 +307,14 @@ def test_nsga2_spreads_along_the_front():
 
 def test_what_cannot_be_an_objective_is_named():
     with pytest.raises(ValueError, match="'-fun': there is no 'fun'; there are fitness, energy"):
-        search(make("nsga2", objectives=("fitness", "-fun")), 1)
+        solve(make("nsga2", objectives=("fitness", "-fun")), 1)
     with pytest.raises(ValueError, match="descriptor 'fun': there is none; there are energy"):
-        search(make("map_elites", descriptors=("fun", "energy")), 1)
+        solve(make("map_elites", descriptors=("fun", "energy")), 1)
 
 
 def test_map_elites_keeps_the_best_of_every_cell():
     optimizer = make("map_elites")
-    everybody = search(optimizer, 12)
+    everybody = solve(optimizer, 12)
     pool = optimizer._concatenate(*everybody)
     cells, worth = np.full(len(pool), -1), pool.scores.worth
     good = np.isfinite(worth)
@@ -304,7 +329,7 @@ def test_map_elites_keeps_the_best_of_every_cell():
 def test_cma_draws_from_its_own_stream():
     before = np.random.get_state()[1].copy()  # noqa: NPY002 (it must stay untouched)
     a, b = make("cma"), make("cma")
-    search(a, 5), search(b, 5)
+    solve(a, 5), solve(b, 5)
     np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
     np.testing.assert_array_equal(a.ask(9).genomes, b.ask(9).genomes)
     with pytest.raises(ValueError, match="no genomes of a fixed number of real genes"):
