@@ -30,6 +30,7 @@ from tyro.conf import arg
 import warp_springs as ws
 from evolve import ENCODINGS, OPTIMIZERS, Evaluator, Search, load
 from evolve.encodings.base import Genomes
+from evolve.judging.worlds import looked_at_again
 
 BASELINE = "random"
 KEPT = 9
@@ -87,9 +88,8 @@ def run(options: Options, preset: str, optimizer: str, encoding: str, seed: int)
     search = Search(load(preset, changes))
     search.prepare()
     started = time.perf_counter()
-    genomes, fitness, cost, simulating = finish(search)
-    robots = search.encoding.express(genomes)
-    look = Evaluator(search.config).second_look(robots, fitness)
+    found = finish(search)
+    look = looked_at_again(Evaluator(search.config), search.encoding, found.genomes, found.fitness)
     champion = int(look.survives.argmax())
     return Outcome(
         preset=preset,
@@ -97,32 +97,44 @@ def run(options: Options, preset: str, optimizer: str, encoding: str, seed: int)
         encoding=encoding,
         seed=seed,
         evaluations=search.optimizer.evaluations,
-        best=float(fitness[champion]),
+        best=float(found.fitness[champion]),
         again=float(look.halved[champion]),
         survives=bool(look.survives[champion]),
         seconds=time.perf_counter() - started,
-        springs_per_second=cost / simulating,
+        springs_per_second=found.cost / found.simulating,
     )
 
 
-def finish(search: Search, kept: int = KEPT) -> tuple[Genomes, np.ndarray, int, float]:
-    """Search to the end.
+@dataclass(frozen=True)
+class Found:
+    """The fittest individuals of all generations of a search, and what they took."""
 
-    Returns:
-        The fittest individuals of all generations, their fitness, and what it took: spring
-        evaluations, and seconds of simulating.
-    """
-    cost, simulating, genomes, fitness = 0, 0.0, None, np.empty(0)
-    while not search.finished:
+    genomes: Genomes
+    fitness: np.ndarray
+    """Of each, the best first."""
+    first: float
+    """The best fitness of the first generation."""
+    cost: int
+    """Spring evaluations."""
+    simulating: float
+    """Seconds."""
+
+
+def finish(search: Search, kept: int = KEPT, seconds: float = float("inf")) -> Found:
+    """Search to the end, or until so many seconds are over."""
+    cost, simulating, genomes, fitness, first = 0, 0.0, None, np.empty(0), np.nan
+    until = time.perf_counter() + seconds
+    while not search.finished and (genomes is None or time.perf_counter() < until):
         generation = search.step()
         cost += int(generation.scores.spring_evaluations.sum())
         simulating += generation.scores.wall_time
         fitness = np.concatenate([fitness, generation.scores.worth])
         new = generation.candidates.genomes
+        first = fitness.max() if genomes is None else first
         genomes = new if genomes is None else search.encoding.concatenate([genomes, new])
         best = np.argsort(-fitness, kind="stable")[:kept]
         genomes, fitness = search.encoding.take(genomes, best), fitness[best]
-    return genomes, fitness, cost, simulating
+    return Found(genomes, fitness, float(first), cost, simulating)
 
 
 def tabulate(outcomes: list[Outcome], options: Options) -> Table:
