@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from evolve.encodings.base import ArrayGenomes, EncodingSettings
+from evolve.encodings.evolving import PacedSettings
 from evolve.encodings.networks import Networks, NetworkSettings
 from evolve.encodings.voxels import VoxelBody, VoxelBodySettings
 
@@ -17,14 +18,12 @@ if TYPE_CHECKING:
 __all__ = ["CppnBodyEncoding", "CppnBodySettings"]
 
 
-class CppnBodySettings(NetworkSettings, VoxelBodySettings):
+class CppnBodySettings(PacedSettings, NetworkSettings, VoxelBodySettings):
     """How far the network may grow, and how often its structure changes."""
 
     type: Literal["cppn_body"] = "cppn_body"
     add_node: float = Field(0.15, ge=0.0, le=1.0)
     """Share of the mutations that split a connection by a new node."""
-    body_rate: float = Field(1.0, ge=0.0, le=1.0)
-    """Share of the mutations that may change the body; the others leave it time to learn."""
     mutation_rate: float = Field(0.3, gt=0.0, le=1.0)
     """Share of the weights that a mutation changes, on average."""
     mutation_step: float = Field(0.1, gt=0.0)
@@ -57,15 +56,10 @@ class CppnBodyEncoding(VoxelBody, ArrayGenomes):
         return self.networks.random(n, rng)
 
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Change weights, functions or the structure of every network, or what it says of phases
-        and materials alone."""
+        """Change weights, functions or the structure of every network."""
         settings = self.settings
         chances = (settings.add_node, settings.add_connection, settings.drop_connection)
-        mutants = self.networks.mutate(genomes, rng, *chances)
-        if settings.body_rate >= 1.0:
-            return mutants
-        bodies = rng.random(len(genomes)) < settings.body_rate
-        return np.where(bodies[:, None], mutants, self.tune(genomes, rng))
+        return self.paced(genomes, self.networks.mutate(genomes, rng, *chances), rng)
 
     def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change what flows into the outputs other than presence: weights, functions, at times

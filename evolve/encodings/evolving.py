@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from evolve.encodings.base import EncodingSettings, Interval
 
-__all__ = ["BodySettings", "EvolvingBody", "WeightSettings"]
+__all__ = ["BodySettings", "EvolvingBody", "PacedSettings", "WeightSettings"]
 
 
 class WeightSettings(EncodingSettings):
@@ -22,6 +23,13 @@ class WeightSettings(EncodingSettings):
     def weight(self, points: int) -> float:
         """Mass of a robot of so many points [kg]."""
         return self.mass if self.mass_per_point is None else points * self.mass_per_point
+
+
+class PacedSettings(EncodingSettings):
+    """How often bodies change, where controllers may change without them."""
+
+    body_rate: float = Field(1.0, ge=0.0, le=1.0)
+    """Share of the mutations that may change the body; the others leave it time to learn."""
 
 
 class BodySettings(WeightSettings):
@@ -46,3 +54,13 @@ class EvolvingBody:
 
     fixed_body: ClassVar[bool] = False
     needs_body: ClassVar[bool] = False
+
+    def paced(
+        self, genomes: np.ndarray, mutants: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """The mutants of genomes, arrays both; as many as the body rate says, others are tuned."""
+        if self.settings.body_rate >= 1.0:
+            return mutants
+        bodies = rng.random(len(genomes)) < self.settings.body_rate
+        bodies = bodies.reshape(-1, *[1] * (genomes.ndim - 1))
+        return np.where(bodies, mutants, self.tune(genomes, rng))

@@ -14,6 +14,7 @@ from evolve.bodies.graph_grammar import Grammar, load_grammar
 from evolve.bodies.limbs import GENES, PHASES, build
 from evolve.encodings.base import EncodingSettings, folded
 from evolve.encodings.cellular import CellGenes, CellSettings
+from evolve.encodings.evolving import PacedSettings
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -33,7 +34,7 @@ PARTS_PER_CELL = 2
 """Parts that a tree may have for each cell of a body: some build none, some build several."""
 
 
-class GrammarSettings(CellSettings):
+class GrammarSettings(PacedSettings, CellSettings):
     """Which rules there are, and how many of them make a robot."""
 
     type: Literal["grammar"] = "grammar"
@@ -100,7 +101,7 @@ class GrammarEncoding(CellGenes):
             if rng.random() < 0.25:
                 _moved_on(genome, int(rng.integers(max(used, 1))), rng)
             mutants[row] = folded(genome, self.circular)
-        return mutants
+        return self.paced(genomes, mutants, rng)
 
     def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change when and how far parts move and how stiff they are, two that are there too."""

@@ -12,6 +12,7 @@ from evolve.bodies.lsystem import CLOSE, OPEN, PITCH, ROLL, TWIN, YAW, Module, P
 from evolve.bodies.lsystem import build as walk
 from evolve.encodings.base import EncodingSettings, folded
 from evolve.encodings.cellular import PHASE, STIFFNESS, TISSUE, CellGenes, CellSettings, tissue
+from evolve.encodings.evolving import PacedSettings
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -34,14 +35,12 @@ SYMBOLS = (
 """What the gene of a symbol chooses from, evenly."""
 
 
-class LsystemSettings(CellSettings):
+class LsystemSettings(PacedSettings, CellSettings):
     """How long rules are, and how often they are applied."""
 
     type: Literal["lsystem"] = "lsystem"
     rule_length: int = Field(6, ge=1, le=32)
     """Modules of a right side, at most."""
-    body_rate: float = Field(1.0, ge=0.0, le=1.0)
-    """Share of the mutations that may change the body; the others leave it time to learn."""
     most_steps: int = Field(4, ge=1, le=12)
     """Times that all symbols are replaced, at most; a gene says how often."""
 
@@ -87,15 +86,12 @@ class LsystemEncoding(CellGenes):
     def mutate(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change some genes, a tissue that the body has at least; at times insert or delete."""
         mutants = self.shifted(genomes, rng, self._named)
-        bodies = rng.random(len(genomes)) < self.settings.body_rate
         for row, genome in enumerate(genomes):
-            if not bodies[row]:
-                mutants[row] = np.where(self._behaviour, mutants[row], genome)
             self._retuned(mutants[row], genome, rng)
-            if bodies[row] and rng.random() < 0.3:
+            if rng.random() < 0.3:
                 rules = mutants[row, : self._ends[0]].reshape(self._rules)
                 self._moved_on(rules[rng.integers(len(rules)), rng.integers(ALTERNATIVES)], rng)
-        return mutants
+        return self.paced(genomes, mutants, rng)
 
     def tune(self, genomes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Change tissues, one that the body has at least, and the phases of cells."""

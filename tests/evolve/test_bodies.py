@@ -97,6 +97,18 @@ def test_a_tuned_robot_has_the_same_body_and_moves_otherwise(name):
 
 
 @pytest.mark.parametrize("name", EVOLVING)
+def test_bodies_change_as_often_as_the_body_rate_says(name):
+    cls, genomes = ENCODINGS[name], genomes_of(name, 100)
+    shapes = [r.positions.tobytes() for r in make(name).express(genomes)]
+    for rate, low, high in ((0.0, 0.0, 0.0), (0.5, 0.0, 0.7), (1.0, 0.05, 1.0)):
+        settings = cls.Settings(body_rate=rate)
+        encoding = cls(SEED_BODY if cls.needs_body else None, settings)
+        mutants = encoding.express(encoding.mutate(genomes, rng(6)))
+        changed = [r.positions.tobytes() != s for r, s in zip(mutants, shapes, strict=True)]
+        assert low <= np.mean(changed) <= high
+
+
+@pytest.mark.parametrize("name", EVOLVING)
 def test_genomes_survive_their_bytes(name):
     encoding, genomes = make(name), genomes_of(name, 20)
     blobs = encoding.to_bytes(genomes)
