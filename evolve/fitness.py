@@ -218,6 +218,18 @@ def brightness(trial: Trial) -> np.ndarray:
     return (1.0 / (1.0 + trial.gap**2)).mean(axis=1)
 
 
+@measure("", goal=True)
+def light(trial: Trial) -> np.ndarray:
+    """Level of the light of a lamp at the goal on the brightest mass at the end: 1 at the lamp.
+
+    One half a metre away from it, in any direction.
+    """
+    end = trial.measured
+    lamp = np.asarray(trial.goal) + end.end_time * np.asarray(trial.motion)
+    gaps = [np.linalg.norm(end.positions(i) - lamp, axis=1).min() for i in range(len(end))]
+    return 1.0 / (1.0 + np.square(gaps))
+
+
 @measure("m")
 def displacement_x(trial: Trial) -> np.ndarray:
     """Way of the centre of mass along x."""

@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 from warp_springs import materials, sensors, shapes
-from warp_springs.body.control import Controller
+from warp_springs.body.control import Controller, Growth
 from warp_springs.body.elements import Elements, Push, Tether, Timetable
 from warp_springs.body.variants import Variants
 from warp_springs.body.waveform import Waveform
@@ -45,6 +45,7 @@ __all__ = [
     "Elements",
     "Energy",
     "Ground",
+    "Growth",
     "HeightField",
     "Limits",
     "Line",

@@ -138,7 +138,8 @@ class Result:
     def signals(self, robot: int) -> np.ndarray:
         """Outputs of a robot's controllers that its muscles obey at the end, shape (outputs,).
 
-        Those of all its controllers, one after the other; from -1 to 1, empty without any.
+        Those of all its controllers, one after the other; from -1 to 1, or the growth so far;
+        empty without any.
         """
         return self._signals.get(self._index(robot), np.zeros(0))
 

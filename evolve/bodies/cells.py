@@ -70,10 +70,11 @@ class Cells:
         edge: Length of the edges of the first cell [m].
         most: Cells that the body may have.
         extent: Longest side of the bounding box that it may have [m].
+        behind: How far back it may reach, seen from the base of the first cell, negative [m].
     """
 
-    def __init__(self, edge: float, most: int, extent: float) -> None:
-        self.edge, self.most, self.extent = edge, most, extent
+    def __init__(self, edge: float, most: int, extent: float, behind: float = -np.inf) -> None:
+        self.edge, self.most, self.extent, self.behind = edge, most, extent, behind
         self.corners: list[np.ndarray] = []
         """The eight masses of each cell."""
         self.parents: list[int] = []
@@ -153,6 +154,8 @@ class Cells:
     def _has_room(self, quad: np.ndarray, tip: np.ndarray, parent: int) -> bool:
         """Whether a new cell keeps the body within its extent, and away from its other cells."""
         if np.ptp(np.concatenate([self._points, tip]), axis=0).max() > self.extent:
+            return False
+        if tip[:, 0].min() < self.behind:
             return False
         middle = 0.5 * (quad.mean(axis=0) + tip.mean(axis=0))
         apart = np.linalg.norm(self.centres - middle, axis=1)

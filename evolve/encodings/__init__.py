@@ -16,11 +16,13 @@ from evolve.encodings.direct import DirectEncoding, DirectSettings
 from evolve.encodings.expression import ExpressionEncoding, ExpressionSettings
 from evolve.encodings.fourier import FourierEncoding, FourierSettings
 from evolve.encodings.grammar import GrammarEncoding, GrammarSettings
+from evolve.encodings.growth import GrowthEncoding, GrowthSettings
 from evolve.encodings.harmonics import HarmonicsEncoding, HarmonicsSettings
 from evolve.encodings.lsystem import LsystemEncoding, LsystemSettings
 from evolve.encodings.morphology import MorphologyEncoding, MorphologySettings
 from evolve.encodings.neural import NeuralEncoding, NeuralSettings
 from evolve.encodings.regions import RegionsEncoding, RegionsSettings
+from evolve.encodings.sprout import SproutEncoding, SproutSettings
 from evolve.encodings.voxels import VoxelsEncoding, VoxelsSettings
 from warp_springs import config as configs
 
@@ -47,6 +49,8 @@ __all__ = [
     "FourierSettings",
     "GrammarEncoding",
     "GrammarSettings",
+    "GrowthEncoding",
+    "GrowthSettings",
     "HarmonicsEncoding",
     "HarmonicsSettings",
     "LsystemEncoding",
@@ -57,6 +61,8 @@ __all__ = [
     "NeuralSettings",
     "RegionsEncoding",
     "RegionsSettings",
+    "SproutEncoding",
+    "SproutSettings",
     "VoxelsEncoding",
     "VoxelsSettings",
 ]
@@ -76,6 +82,8 @@ ENCODINGS: dict[str, type[Encoding]] = {
     "arena": ArenaEncoding,
     "lsystem": LsystemEncoding,
     "grammar": GrammarEncoding,
+    "growth": GrowthEncoding,
+    "sprout": SproutEncoding,
 }
 """Name in the configuration -> class."""
 

@@ -44,13 +44,13 @@ class CellBody(EvolvingBody):
 
     settings: CellSettings
 
-    def cells(self) -> Cells:
-        """An empty body that takes no more cells than the limits allow."""
+    def cells(self, behind: float = -np.inf) -> Cells:
+        """An empty body that takes no more cells than the limits allow; see `Cells`."""
         settings = self.settings
         most = min(
             settings.most_cells, (settings.most_masses - 4) // 4, (settings.most_springs - 6) // 22
         )
-        return Cells(settings.edge, max(most, 1), settings.largest_extent)
+        return Cells(settings.edge, max(most, 1), settings.largest_extent, behind)
 
     def robots(self, bodies: Iterable[Cells]) -> list[ws.Robot]:
         """The robots of grown bodies."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,7 +14,31 @@ from warp_springs.checks import check_number
 from warp_springs.geometry import FloatArray
 from warp_springs.sensors import TARGETS, Sensor, triple
 
-__all__ = ["Controller", "body_frame"]
+__all__ = ["Controller", "Growth", "body_frame"]
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Outputs of a controller as the speed of growth, which is never undone.
+
+    An output o > 0 adds o ``speed`` a second to its growth, from 0 to ``limit``; as long as the
+    material lasts: of what the outputs ask for beyond the ``budget`` each gets the same part.
+
+    Attributes:
+        speed: Growth at an output of 1 [1/s].
+        limit: Largest growth of one output.
+        budget: Largest sum of the growths of all outputs.
+    """
+
+    speed: float = 0.5
+    limit: float = 1.0
+    budget: float = math.inf
+
+    def __post_init__(self) -> None:
+        check_number("Growth.speed", self.speed, above=0.0)
+        check_number("Growth.limit", self.limit, above=0.0)
+        if not self.budget >= 0.0:
+            raise ValueError(f"Growth.budget: got {self.budget!r}, expected 0 or more")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +50,7 @@ class Controller:
     of 1, or of the readings and 1 where there are none. A muscle has the mean rest length
     ``rest_length (1 + reach a)``; a rhythm of its own comes on top. Its activation a is the output
     of the latest reading, or follows it with a lag, ``response da/dt = output - a`` from a = 0 on.
+    With a ``growth`` the growth of an output takes the place of the output.
 
     Attributes:
         sensors: What it reads, in this order: see `ws.sensors`.
@@ -32,13 +58,17 @@ class Controller:
         weights: All weights, shape (n_weights,): rows (H, readings [+ H] + 1) into the hidden
             neurons, then rows (outputs, H + 1) out of them, the last of each row is that of 1;
             zero when left out, which leaves the muscles at rest.
-        outputs: Which output each muscle obeys, shape (m,); one for each when left out.
-        reach: Largest change of a rest length, as a part of it, less than 1.
+        outputs: Which output each muscle obeys, shape (m,), or which two, the mean of which it
+            obeys, shape (m, 2); one for each when left out.
+        reach: Largest change of a rest length, as a part of it, less than 1: one number for all, or
+            one for each muscle, shape (m,), negative for muscles that do the opposite. Of a growing
+            muscle the change at a growth of 1, of any size.
         hidden: Hidden neurons H, 0 for a network of one layer.
         recurrent: Whether the hidden neurons remember.
         rate: Readings a second [1/s]; rounded so that whole steps lie between them.
         response: Time in which activations come to 63 % of a new output [s]; 0 for at once. They
             change in steps of an eighth of it, or less, each the mean of the lag over its time.
+        growth: A `Growth`, or None: rest lengths are set anew with each reading.
         frame: Set by `Robot.controlled`: parts by which the masses make up the centre of mass,
             forward and left, shape (3, M).
 
@@ -49,12 +79,13 @@ class Controller:
     sensors: tuple[Sensor, ...]
     muscles: tuple[int, ...]
     weights: FloatArray = None  # type: ignore[assignment]  # an array once it is made
-    outputs: tuple[int, ...] = None  # type: ignore[assignment]
-    reach: float = 0.2
+    outputs: tuple[int, ...] | tuple[tuple[int, int], ...] = None  # type: ignore[assignment]
+    reach: float | tuple[float, ...] = 0.2
     hidden: int = 8
     recurrent: bool = False
     rate: float = 20.0
     response: float = 0.0
+    growth: Growth | None = None
     frame: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -65,7 +96,7 @@ class Controller:
             raise ValueError(f"Controller.sensors: got {self.sensors!r}, expected ws.sensors")
         put(self, "muscles", _indices("muscles", self.muscles))
         given = range(len(self.muscles)) if self.outputs is None else self.outputs
-        put(self, "outputs", _indices("outputs", given))
+        put(self, "outputs", _outputs(given))
         if len(self.outputs) != len(self.muscles):
             raise ValueError(
                 f"Controller.outputs: {len(self.outputs)} given for {len(self.muscles)} muscles"
@@ -73,10 +104,10 @@ class Controller:
         if len(set(self.muscles)) != len(self.muscles):
             raise ValueError("Controller.muscles: a spring is named twice")
         check_number("Controller.rate", self.rate, above=0.0)
-        check_number("Controller.reach", self.reach, above=0.0)
         check_number("Controller.response", self.response, at_least=0.0)
-        if self.reach >= 1.0:
-            raise ValueError(f"Controller.reach: got {self.reach!r}, expected less than 1")
+        if self.growth is not None and not isinstance(self.growth, Growth):
+            raise ValueError(f"Controller.growth: got {self.growth!r}, expected a Growth or None")
+        put(self, "reach", self._checked_reach())
         if isinstance(self.hidden, bool) or int(self.hidden) != self.hidden or self.hidden < 0:
             raise ValueError(f"Controller.hidden: got {self.hidden!r}, expected 0 or more neurons")
         if self.recurrent and not self.hidden:
@@ -92,7 +123,7 @@ class Controller:
     @property
     def n_outputs(self) -> int:
         """Outputs of the network."""
-        return max(self.outputs) + 1
+        return int(np.max(self.outputs)) + 1
 
     @property
     def n_weights(self) -> int:
@@ -102,6 +133,26 @@ class Controller:
             return self.n_outputs * into
         into += self.hidden if self.recurrent else 0
         return self.hidden * into + self.n_outputs * (self.hidden + 1)
+
+    def _checked_reach(self) -> float | tuple[float, ...]:
+        """The reach as a number, or one for each muscle; a ValueError where it is neither."""
+        try:
+            reach = np.asarray(self.reach, np.float64)
+        except (TypeError, ValueError):
+            reach = np.full(0, np.nan)
+        if reach.shape not in ((), (len(self.muscles),)) or not np.isfinite(reach).all():
+            raise ValueError(
+                f"Controller.reach: got {self.reach!r}, expected a number, or one for each of "
+                f"{len(self.muscles)} muscles"
+            )
+        if self.growth is not None:
+            if (reach * self.growth.limit).min() <= -1.0:
+                raise ValueError("Controller.reach: a rest length would shrink to nothing")
+        elif np.abs(reach).max() >= 1.0 or (reach.ndim == 0 and reach <= 0.0):
+            raise ValueError(
+                f"Controller.reach: got {self.reach!r}, expected more than 0 and less than 1"
+            )
+        return float(reach) if reach.ndim == 0 else tuple(reach.tolist())
 
     def replace(self, **changes: Any) -> Controller:
         """The same controller with some fields replaced."""
@@ -167,7 +218,7 @@ class Controller:
     def _values(self) -> tuple:
         frame = None if self.frame is None else (self.frame + 0.0).tobytes()
         network = (self.hidden, self.recurrent, (self.weights + 0.0).tobytes())
-        pace = (self.reach, self.rate, self.response)
+        pace = (self.reach, self.rate, self.response, self.growth)
         return (self.sensors, self.muscles, self.outputs, *network, *pace, frame)
 
     def __eq__(self, other: object) -> bool:
@@ -191,6 +242,16 @@ def body_frame(masses: FloatArray, positions: FloatArray) -> FloatArray:
 
 def _over(sensor: Sensor) -> str:
     return "spring" if sensor.kind == "length" else "mass"
+
+
+def _outputs(given: Sequence) -> tuple:
+    """Indices, or pairs of indices."""
+    array = np.asarray(given)
+    if array.ndim != 2:
+        return _indices("outputs", given)
+    if array.shape[1] != 2:
+        raise ValueError(f"Controller.outputs: got {given!r}, expected one or two for each muscle")
+    return tuple(zip(*(_indices("outputs", column) for column in array.T), strict=True))
 
 
 def _indices(name: str, values: Sequence[int]) -> tuple[int, ...]:

@@ -39,7 +39,9 @@ def controlled(robot: Robot, signals: FloatArray) -> FloatArray:
     for controller in robot.elements.controllers:
         muscles = np.array(controller.muscles)
         asked = signals[..., first + np.array(controller.outputs)]
-        change[..., muscles] = controller.reach * robot.rest_length[muscles] * asked
+        if np.ndim(controller.outputs) == 2:  # the mean of two
+            asked = asked.mean(axis=-1)
+        change[..., muscles] = np.array(controller.reach) * robot.rest_length[muscles] * asked
         first += controller.n_outputs
     return change
 

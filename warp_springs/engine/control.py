@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import warp as wp
 
-from warp_springs.body.control import Controller
+from warp_springs.body.control import Controller, Growth
 from warp_springs.body.variants import Variants
 from warp_springs.kernels.buffers import ENERGIES
 from warp_springs.kernels.control import BRAIN, TABLES, control, control_struct
@@ -138,7 +138,7 @@ class Pilot:
         self.work = np.zeros(len(batch.slots.bundle))
         self._ledger = False
         reach = piece.reach(batch, members)
-        tables = _Tables(loops, members, reach)
+        tables = _Tables(loops, members, reach, dt)
         filled = tables.arrays()
         obstacles, heights = obstacle_tables(scene)
         filled |= {"constants": constants[: len(CONSTANTS)]}
@@ -155,7 +155,7 @@ class Pilot:
         self._members = np.array(members)
         self.outputs = tables.outputs
         self._groups = []
-        for pace, rows in tables.grouped(dt).items():
+        for pace, rows in tables.grouped().items():
             chosen = self._chosen(kernel, reach, tables.brains[rows], pace)
             bundles = np.unique(batch.slots.bundle[tables.owner[rows]]).astype(np.int32)
             which = wp.array(bundles, dtype=wp.int32, device="cpu")
@@ -220,7 +220,8 @@ class Pilot:
 class _Tables:
     """The tables of the kernel, filled controller by controller."""
 
-    def __init__(self, loops: _Loops, members: Sequence[int], reach: Reach) -> None:
+    def __init__(self, loops: _Loops, members: Sequence[int], reach: Reach, dt: float) -> None:
+        self._dt = dt
         self._parts: dict[str, list[np.ndarray]] = defaultdict(list)
         self._sizes: dict[str, int] = defaultdict(int)
         self._shared: dict[tuple, tuple[int, int]] = {}
@@ -238,11 +239,11 @@ class _Tables:
         self.brains = np.array(rows, np.int64)
         self.owner = np.array(owner)
 
-    def grouped(self, dt: float) -> dict[Pace, list[int]]:
+    def grouped(self) -> dict[Pace, list[int]]:
         """Rows of the table of controllers, by their pace, the hastiest first."""
         found = defaultdict(list)
         for row, controller in enumerate(self._controllers):
-            found[pace(controller, dt)].append(row)
+            found[pace(controller, self._dt)].append(row)
         return {key: found[key] for key in sorted(found, key=lambda p: (p.every, p.follow, p.left))}
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -267,10 +268,12 @@ class _Tables:
         sensor, frame = self._shared[key]
         muscles = np.array(controller.muscles)
         rank = self._rank(body)[muscles]
-        table = np.stack([np.array(controller.outputs), cells[0][rank], cells[1][rank]], axis=1)
+        outputs = np.broadcast_to(np.array(controller.outputs).T, (2, len(muscles)))
+        table = np.stack([*outputs, cells[0][rank], cells[1][rank]], axis=1)
         half = 0.5 * loops.values(index, "stiffness")[muscles]
         rest = half * lengths[muscles]
-        hidden = controller.hidden
+        hidden, growth = controller.hidden, controller.growth
+        scratch = 2 * hidden + (0 if growth is None else controller.n_outputs)
         row = {
             "place": place[0],
             "width": place[1],
@@ -284,15 +287,21 @@ class _Tables:
             "recurrent": controller.recurrent,
             "outputs": controller.n_outputs,
             "weight": self._add("weights", loops.weights(index, controller)),
-            "memory": self._add("memories", np.zeros(2 * hidden)),
+            "memory": self._add("memories", np.zeros(scratch)),
             "reading": self._add("readings", np.zeros(controller.n_readings)),
             "signal": self._add("signals", np.zeros(controller.n_outputs)),
             "activation": self._add("activations", np.zeros(2 * controller.n_outputs)),
-            "muscle": self._add("muscles", table) // 3,
+            "muscle": self._add("muscles", table) // 4,
             "muscles": len(muscles),
+            "growth": -1 if growth is None else self._growth(controller, growth),
         }
         self._add("strengths", np.stack([rest, rest * controller.reach], axis=1))
         return [int(row[name]) for name in BRAIN]
+
+    def _growth(self, controller: Controller, growth: Growth) -> int:
+        """Append how the outputs of a controller grow; where it begins."""
+        step = growth.speed * pace(controller, self._dt).every * self._dt
+        return self._add("growths", [step, growth.limit, growth.budget])
 
     def _sense(self, controller: Controller, body: Robot, rest: np.ndarray) -> tuple[int, int]:
         """Append the sensors and the frame of a controller; where they begin."""

@@ -35,12 +35,13 @@ BRAIN = (
     "recurrent",
     "outputs",
     "weight",
-    "memory",  # hidden neurons, then room for the next ones
+    "memory",  # hidden neurons, room for the next ones, and for what grows
     "reading",
     "signal",
     "muscle",  # its first, and how many
     "muscles",
     "activation",  # one for each output
+    "growth",  # -1: its outputs do not grow
 )
 #: Columns of the table of sensors: kind, first entry of the list of what it sits on, how many.
 SENSOR = ("kind", "first", "count")
@@ -54,15 +55,16 @@ TABLES = {
     "lengths": np.float64,  # of each site: rest length of the spring, m
     "frames": np.float64,
     "weights": np.float64,
-    "muscles": np.int64,  # its output, and where its h is kept, twice (the same where once)
+    "muscles": np.int64,  # both outputs, and where its h is kept (each the same twice where one)
     "strengths": np.float64,  # h at an output of 0, and what an output of 1 adds, N
+    "growths": np.float64,  # what an output of 1 adds at a reading, limit, budget
     "constants": np.float64,  # of the scene, see kernels.law
     "obstacles": np.float64,
     "heights": np.float64,
     # what a controller changes
     "memories": np.float64,
     "readings": np.float64,
-    "signals": np.float64,
+    "signals": np.float64,  # outputs, or what has grown
     "activations": np.float64,  # what the muscles do of a signal, so far
 }
 
@@ -187,21 +189,42 @@ for (int64_t j = 0; j < hidden; ++j) {
     next[j] = ::tanh(sum + *weight++);
 }
 for (int64_t j = 0; j < hidden; ++j) memory[j] = next[j];
+// Where they grow, what they ask for goes aside first, for the material may not suffice.
+const double* const growth = tables.growths.data + brain[18];
+const bool growing = brain[18] >= 0;
+double* const asked = memory + 2 * hidden;
+double wanted = 0.0, used = 0.0;
 for (int64_t j = 0; j < outputs; ++j) {
     const double sum = hidden ? weighed(memory, hidden) : weighed(reading, filled);
-    signal[j] = ::tanh(sum + *weight++);
+    const double output = ::tanh(sum + *weight++);
+    if (!growing) {
+        signal[j] = output;
+        continue;
+    }
+    const double more = output > 0.0 ? growth[0] * output : 0.0, room = growth[1] - signal[j];
+    asked[j] = more < room ? more : room;
+    wanted += asked[j];
+    used += signal[j];
+}
+if (growing && wanted > 0.0) {
+    const double left_over = growth[2] > used ? growth[2] - used : 0.0;
+    const double part = wanted > left_over ? left_over / wanted : 1.0;
+    for (int64_t j = 0; j < outputs; ++j) signal[j] += part * asked[j];
 }
 """
 
 _FOLLOW = r"""
 double* const activation = tables.activations.data + brain[17];
 for (int64_t m = brain[15]; m < brain[15] + brain[16]; ++m) {
-    const int64_t* const muscle = tables.muscles.data + 3 * m;
+    const int64_t* const muscle = tables.muscles.data + 4 * m;
     const double* const strength = tables.strengths.data + 2 * m;
-    const double target = signal[muscle[0]];
-    const double a = target + mean * (activation[muscle[0]] - target);
+    double a = 0.0;
+    for (int e = 0; e < 2; ++e) {
+        const double target = signal[muscle[e]];
+        a += 0.5 * (target + mean * (activation[muscle[e]] - target));
+    }
     const double h = strength[0] + strength[1] * a;
-    coefficients.data[muscle[1]] = coefficients.data[muscle[2]] = (coefficient)h;
+    coefficients.data[muscle[2]] = coefficients.data[muscle[3]] = (coefficient)h;
 }
 for (int64_t j = 0; j < outputs; ++j)
     activation[j] = signal[j] + left * (activation[j] - signal[j]);
