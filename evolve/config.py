@@ -110,6 +110,9 @@ class SecondLookConfig(PerturbationConfig):
     from perturbed starts."""
     candidates: int = Field(32, ge=1)
     """How many of the best different individuals are looked at."""
+    rounds: int = Field(8, ge=1)
+    """How often: while nobody survives, as many are taken of those who have less than 90 % of the
+    last one's fitness."""
     trials: int = Field(16, ge=1)
     """Perturbed starts of each candidate."""
     quantile: float = Field(0.5, ge=0.0, le=1.0)

@@ -324,10 +324,10 @@ class Store:
         rows = (row[:twice] + row[twice + 1 :] for row in cursor)
         return names[:twice] + names[twice + 1 :], rows
 
-    def best(self, count: int) -> list[int]:
-        """Ids of the best individuals, the best first; equal genomes count once."""
+    def best(self, count: int, below: float = np.inf) -> list[int]:
+        """Ids of the best individuals below a fitness, the best first; equal genomes count once."""
         ranking = self._connection.execute(
-            "SELECT id FROM individual WHERE fitness IS NOT NULL ORDER BY fitness DESC, id"
+            "SELECT id FROM individual WHERE fitness < ? ORDER BY fitness DESC, id", (below,)
         )
         chosen: dict[bytes, int] = {}
         for (individual,) in ranking:

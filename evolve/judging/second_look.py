@@ -8,7 +8,8 @@ which a lucky fall does not survive.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -32,6 +33,12 @@ class SecondLook:
     """That fitness divided by the first one, shape (n,)."""
     survives: np.ndarray
     """Whether enough is left of both, shape (n,), bool."""
+
+    @staticmethod
+    def joined(looks: Sequence[SecondLook]) -> SecondLook:
+        """Several looks as one, in their order."""
+        names = [field.name for field in fields(SecondLook)]
+        return SecondLook(*(np.concatenate([getattr(look, n) for look in looks]) for n in names))
 
 
 def quantile(fitness: np.ndarray, level: float) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from evolve.errors import RunError
 from evolve.judging.evaluate import Evaluator
+from evolve.judging.second_look import SecondLook
 from evolve.judging.worlds import looked_at_again
 from evolve.reports.archive import niches
 from evolve.reports.bodies import shown, various
@@ -33,6 +34,8 @@ __all__ = [
 
 ZOO_SIZE = 9
 """Robots in the zoo, unless told otherwise."""
+DESCENT = 0.9
+"""Fitness of the next who are looked at twice, at most, in that of the last."""
 
 
 def export(
@@ -137,6 +140,8 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     """Look twice at the best different individuals, and record what is left of their fitness.
 
     Where bodies evolve, or the optimizer keeps an archive, also at good ones unlike the others.
+    The best are often one family, with one weakness; while nobody survives, more are looked at
+    further down, each round of them well below the last.
 
     Returns:
         All of them, survivors first, the fittest first.
@@ -144,16 +149,25 @@ def crown(run: Run, store: Store, best: int = ZOO_SIZE) -> list[Finalist]:
     Raises:
         RunError: Nobody has a fitness.
     """
-    ids = store.best(max(best, run.config.task.second_look.candidates))
+    second_look = run.config.task.second_look
+    count = max(best, second_look.candidates)
+    ids = store.best(count)
     if not ids:
         raise RunError(f"nobody in {run.directory} has a fitness: there is nothing to export")
-    if niches(run.config):
-        ids = list(dict.fromkeys([*ids, *various(run, store, best)]))
-    encoding = run.config.make_encoding()
-    genomes = encoding.from_bytes(store.genomes(ids))
-    fitness = store.scores(ids).fitness
-    look = looked_at_again(Evaluator(run.config), encoding, genomes, fitness)
-    store.put_second_look(ids, look)
+    others = various(run, store, best) if niches(run.config) else []
+    evaluator, encoding = Evaluator(run.config), run.config.make_encoding()
+    seen: list[int] = []
+    looks: list[SecondLook] = []
+    while ids and len(looks) < second_look.rounds:
+        new = list(dict.fromkeys([*ids, *others]))
+        genomes = encoding.from_bytes(store.genomes(new))
+        looks.append(looked_at_again(evaluator, encoding, genomes, store.scores(new).fitness))
+        seen += new
+        last = store.scores(ids[-1:]).fitness[0]
+        if looks[-1].survives.any() or last <= 0.0:
+            break
+        ids, others = [i for i in store.best(count, DESCENT * last) if i not in seen], []
+    store.put_second_look(seen, SecondLook.joined(looks))
     return store.finalists()
 
 

@@ -57,7 +57,7 @@ def verdict(finalists: Sequence[Finalist], config: RunConfig) -> str:
     if first.survives:
         return f"champion {who}: {figures}: survives"
     count = len(finalists)
-    nobody = f"none of the {count} best survives" if count > 1 else "the best does NOT survive"
+    nobody = f"none of {count} good ones survives" if count > 1 else "the best does NOT survive"
     return f"no champion: {nobody} the second look; the fittest, {who}: {figures}"
 
 
@@ -109,8 +109,8 @@ def describe(config: RunConfig) -> Iterator[tuple[str, str]]:
     look = task.second_look
     yield (
         "crown",
-        f"to the fittest of the {look.candidates} best that keeps {look.threshold:.0%} at half "
-        f"the time step in float64 and {_of_trials(look)}",
+        f"to the fittest that keeps {look.threshold:.0%} at half the time step in float64 and "
+        f"{_of_trials(look)}, of the {look.candidates} best, or of others while none of them does",
     )
 
 

@@ -74,9 +74,9 @@ def _exploits(finalists: Sequence[Finalist]) -> Iterator[str]:
         yield f"All {len(finalists)} that were looked at twice kept their fitness."
         return
     yield (
-        f"{len(lost)} of the {len(finalists)} best did not keep their fitness: {len(step)} lost "
-        f"more at half the time step (they exploited the simulator), {len(lost) - len(step)} from "
-        "perturbed starts (they were lucky)."
+        f"{len(lost)} of {len(finalists)} that were looked at twice did not keep their fitness: "
+        f"{len(step)} lost more at half the time step (they exploited the simulator), "
+        f"{len(lost) - len(step)} from perturbed starts (they were lucky)."
     )
 
 

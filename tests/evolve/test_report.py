@@ -90,7 +90,7 @@ def test_a_verdict_says_whether_to_believe_it(tiny):
         "0.475 (95%) at half the time step, 0.450 (90%) from perturbed starts: survives"
     )
     assert verdict([BAD, BAD], tiny) == (
-        "no champion: none of the 2 best survives the second look; the fittest, "
+        "no champion: none of 2 good ones survives the second look; the fittest, "
         "#9 of generation 2: 4.500 body diameters per cycle; "
         "stopped at half the time step, 0.045 (1%) from perturbed starts"
     )

@@ -53,7 +53,7 @@ def test_exploits_of_the_integrator_are_not_crowned(tmp_path):
         if champion.survives:
             assert champion.fitness < HONEST
         else:
-            words = "no champion: none of the 32 best survives"
+            words = f"no champion: none of {len(finalists)} good ones survives"
             assert verdict(finalists, run.config).startswith(words)
         assert all(f.fitness < HONEST for f in finalists if f.survives)
     assert found >= 2, "evolution still finds the exploit"
@@ -76,6 +76,24 @@ def test_the_crown_goes_past_the_exploit_to_the_best_survivor(tmp_path):
     assert survivors and finalists == survivors + demoted
     assert max(f.fitness for f in demoted) > finalists[0].fitness
     assert finalists[0].fitness == max(f.fitness for f in survivors)
+
+
+def test_while_nobody_survives_others_are_looked_at_further_down(tmp_path):
+    config = load("cube", SMALL | {"task.second_look.candidates": 5})
+    run = Run.create(config, tmp_path)
+    assert run.evolve()
+    with Store.open(run.record_path, write=True) as store:
+        ranking = store.best(1000)
+        fitness = store.scores(ranking).fitness
+        below = store.best(3, below=fitness[20])
+        assert store.scores(below).fitness.tolist() == fitness[fitness < fitness[20]][:3].tolist()
+        # Nobody keeps 5 times the fitness: every round is 5 more, each well below the last.
+        strict = {"threshold": 5.0, "rounds": 3, "candidates": 5}
+        run.config = load("cube", SMALL | {f"task.second_look.{k}": v for k, v in strict.items()})
+        finalists = crown(run, store, best=1)
+    assert len(finalists) == 15 and not any(f.survives for f in finalists)
+    seen = [f.fitness for f in finalists]
+    assert seen[5] < 0.9 * seen[4] and seen[10] < 0.9 * seen[9]
 
 
 def test_the_look_halves_the_step_in_float64():
