@@ -14,6 +14,7 @@ from evolve.judging.cluster import Cluster
 from evolve.judging.judge import Here, Judge, Simulator, Ticket
 from evolve.judging.pool import Pool
 from evolve.judging.scores import Scores
+from evolve.memory import keep_memory
 from evolve.optimizers.base import Candidates, Individuals
 from evolve.store import Store
 from evolve.streams import Role, Streams
@@ -57,6 +58,7 @@ class Search:
     """
 
     def __init__(self, config: RunConfig, simulator: Simulator | None = None) -> None:
+        keep_memory()
         self.config = config
         self.encoding = config.make_encoding()
         self.optimizer = config.make_optimizer(self.encoding)

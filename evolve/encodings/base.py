@@ -47,8 +47,8 @@ class EncodingSettings(BaseModel):
 class Encoding(Protocol):
     """How genomes of one kind are made, varied, stored and expressed as robots.
 
-    Every method works on a whole population at once and returns a new one; none changes what it
-    was given. Random numbers come from the generator passed in and from nowhere else.
+    Every method works on a whole population at once and returns a new one; none but `overwrite`
+    changes what it was given. Random numbers come from the generator passed in, nowhere else.
     """
 
     Settings: ClassVar[type[EncodingSettings]]
@@ -90,6 +90,11 @@ class Encoding(Protocol):
     def concatenate(self, parts: Sequence[Genomes]) -> Genomes:
         """One population from several."""
 
+    def overwrite(
+        self, genomes: Genomes, rows: np.ndarray, others: Genomes, whence: np.ndarray
+    ) -> None:
+        """Put others[whence[i]] in place of genomes[rows[i]]: only for who just made `genomes`."""
+
 
 def folded(genes: np.ndarray, circular: np.ndarray | bool = False) -> np.ndarray:
     """Bring genes back into [0, 1]: those on a circle go round, the others are reflected."""
@@ -122,7 +127,13 @@ class ArrayGenomes:
 
     def concatenate(self, parts: Sequence[np.ndarray]) -> np.ndarray:
         """One population from several."""
-        return np.concatenate(parts)
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def overwrite(
+        self, genomes: np.ndarray, rows: np.ndarray, others: np.ndarray, whence: np.ndarray
+    ) -> None:
+        """Put others[whence[i]] in place of genomes[rows[i]]."""
+        genomes[rows] = others[whence]
 
     def to_bytes(self, genomes: np.ndarray) -> list[bytes]:
         """Every genome as its genes in little-endian float32."""
@@ -151,3 +162,10 @@ class ListGenomes:
     def concatenate(self, parts: Sequence[Sequence[Any]]) -> list[Any]:
         """One population from several."""
         return [genome for part in parts for genome in part]
+
+    def overwrite(
+        self, genomes: list[Any], rows: np.ndarray, others: Sequence[Any], whence: np.ndarray
+    ) -> None:
+        """Put others[whence[i]] in place of genomes[rows[i]]."""
+        for row, place in zip(rows.tolist(), whence.tolist(), strict=True):
+            genomes[row] = others[place]

@@ -68,7 +68,9 @@ class DirectEncoding(FixedBody, ArrayGenomes):
         # Few springs change: only their genes are shifted, as K rows of all kinds.
         rows, springs = np.divmod(np.flatnonzero(chosen), chosen.shape[1])
         shift = rng.standard_normal((len(rows), kinds_of), dtype=np.float32)
-        shift = np.where(in_region[rows, None], shared[rows], shift) * kinds[rows]
+        of_region = np.flatnonzero(in_region[rows])
+        shift[of_region] = shared[rows[of_region]]
+        shift *= kinds.astype(np.float32)[rows]
         genes = genomes[rows, :, springs] + np.float32(self.settings.mutation_step) * shift
         mutants = genomes.copy()
         mutants[rows, :, springs] = folded(genes, self.on_circle)

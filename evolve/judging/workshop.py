@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from evolve.judging.worlds import judged
+from evolve.memory import keep_memory
 
 __all__ = ["Answer", "Workshop", "chunks", "cores"]
 
@@ -34,6 +35,7 @@ class Workshop:
         from evolve.toml import parse
 
         ws.quiet()
+        keep_memory()
         # Only what decides no bit differs from the run: where and on how many cores.
         settings = {
             "simulation.device": device,

@@ -65,7 +65,7 @@ class AgeFitness(Breeder):
         ages, pool = self._young_ages, individuals
         if self._survivors is not None:
             ages = np.concatenate([self._ages + 1, ages])
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         worth = pool.scores.worth
         front = ranks(np.stack([worth, -ages.astype(np.float64)], axis=1))
         kept = np.lexsort((pool.ids, -worth, front))[: len(individuals)]

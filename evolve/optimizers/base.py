@@ -176,19 +176,39 @@ class Optimizer(ABC):
 
     def _take(self, individuals: Individuals, indices: np.ndarray) -> Individuals:
         """The individuals at `indices`, in that order."""
+        genomes, encoding = individuals.genomes, self.encoding
+        if isinstance(genomes, _Two):
+            taken = genomes.taken(encoding, indices)
+        else:
+            taken = encoding.take(genomes, indices)
+        return Individuals(individuals.ids[indices], taken, individuals.scores.take(indices))
+
+    def _joined(self, old: Individuals, new: Individuals) -> Individuals:
+        """One group from two, to `_take` from: their genomes stay where they are till then."""
         return Individuals(
-            individuals.ids[indices],
-            self.encoding.take(individuals.genomes, indices),
-            individuals.scores.take(indices),
+            np.concatenate([old.ids, new.ids]),
+            _Two(old.genomes, new.genomes),
+            Scores.concatenate([old.scores, new.scores]),
         )
 
-    def _concatenate(self, *parts: Individuals) -> Individuals:
-        """One group of individuals from several."""
-        return Individuals(
-            np.concatenate([part.ids for part in parts]),
-            self.encoding.concatenate([part.genomes for part in parts]),
-            Scores.concatenate([part.scores for part in parts]),
-        )
+
+@dataclass(frozen=True)
+class _Two:
+    """Two populations, end to end."""
+
+    first: Genomes
+    second: Genomes
+
+    def taken(self, encoding: Encoding, indices: np.ndarray) -> Genomes:
+        """The genomes at `indices`, in that order."""
+        of_second = indices >= len(self.first)
+        place = np.where(of_second, indices - len(self.first), indices)
+        if not len(self.first) or of_second.all():
+            return encoding.take(self.second, place)
+        rows = np.flatnonzero(of_second)
+        found = encoding.take(self.first, np.where(of_second, 0, place))
+        encoding.overwrite(found, rows, self.second, place[rows])
+        return found
 
 
 def described(scores: Scores, names: Sequence[str]) -> np.ndarray:

@@ -69,7 +69,7 @@ class DeterministicCrowding(PopulationOptimizer):
         rival[fathers] = np.where(swapped, first, second)
         rival[lonely] = n - 1
         replaced = individuals.scores.worth[rival] >= old.scores.worth
-        pool = self._concatenate(old, individuals)
+        pool = self._joined(old, individuals)
         self._survivors = self._take(pool, np.where(replaced, n + rival, np.arange(n)))
 
     def _couples(self, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -34,7 +34,7 @@ class GeneticAlgorithm(Breeder):
             self._survivors = self._take(individuals, order(individuals))
             return
         size = len(individuals)
-        pool = self._concatenate(self._survivors, individuals)
+        pool = self._joined(self._survivors, individuals)
         elite, others = np.split(order(pool), [round(self.settings.elites * size)])
         young = others[others >= len(self._survivors)]
         # Whoever is not of the elite is no better than the elite: the whole stays sorted.

@@ -44,9 +44,9 @@ class HillClimber(PopulationOptimizer):
         mutants = self.encoding.mutate(climbers.genomes, rng)
         lost = np.isneginf(climbers.scores.worth)
         parents = np.where(lost, NOBODY, climbers.ids)
-        pool = self.encoding.concatenate([mutants, fresh])
-        genomes = self.encoding.take(pool, np.arange(n) + n * lost)
-        return genomes, np.stack([parents, np.full(n, NOBODY)], axis=1)
+        anew = np.flatnonzero(lost)
+        self.encoding.overwrite(mutants, anew, fresh, anew)
+        return mutants, np.stack([parents, np.full(n, NOBODY)], axis=1)
 
     def _tell(self, individuals: Individuals) -> None:
         whose = self._whose(len(individuals))
@@ -58,7 +58,7 @@ class HillClimber(PopulationOptimizer):
             return
         moved = individuals.scores.worth[best] >= self._survivors.scores.worth
         n = len(best)
-        pool = self._concatenate(self._survivors, self._take(individuals, best))
+        pool = self._joined(self._survivors, self._take(individuals, best))
         self._survivors = self._take(pool, np.arange(n) + n * moved)
 
     def _whose(self, n: int) -> np.ndarray:

@@ -89,7 +89,7 @@ class MapElites(Breeder):
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals
         if self._survivors is not None:
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         measures, worth = self._measures(pool), pool.scores.worth
         good = np.flatnonzero(np.isfinite(measures).all(axis=1) & np.isfinite(worth))
         if not len(good):

@@ -39,6 +39,6 @@ class Nsga2(Breeder):
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals
         if self._survivors is not None:
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         points = objectives(pool.scores, self.settings.objectives)
         self._survivors = self._take(pool, best_first(points, pool.ids)[: len(individuals)])

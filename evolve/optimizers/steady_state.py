@@ -50,5 +50,5 @@ class SteadyState(Breeder):
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals
         if self._survivors is not None:
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         self._survivors = self._take(pool, order(pool)[: self.settings.living])

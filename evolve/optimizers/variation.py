@@ -46,10 +46,11 @@ class Breeder(PopulationOptimizer):
         ids[~crossed, 1] = NOBODY
         mothers = encoding.take(pool.genomes, parents[:, 0])
         fathers = encoding.take(pool.genomes, parents[:, 1])
-        both = encoding.cross(mothers, fathers, streams(turn, Role.CROSSOVER))
-        young = encoding.take(encoding.concatenate([mothers, both]), np.arange(n) + n * crossed)
+        young = encoding.cross(mothers, fathers, streams(turn, Role.CROSSOVER))
+        single = np.flatnonzero(~crossed)
+        encoding.overwrite(young, single, mothers, single)
         mutants = encoding.mutate(young, streams(turn, Role.MUTATION))
         coins = streams(turn, Role.MUTATION, 1).random(n)
-        mutated = ~crossed | (coins < settings.mutation_rate)
-        both = encoding.concatenate([young, mutants])
-        return encoding.take(both, np.arange(n) + n * mutated), ids
+        spared = np.flatnonzero(crossed & (coins >= settings.mutation_rate))
+        encoding.overwrite(mutants, spared, young, spared)
+        return mutants, ids
