@@ -12,6 +12,7 @@ are the same in both.
 
 from warp_springs.kernels.dialect import native_width, quad_operations, vector_dialect
 from warp_springs.kernels.law import LAW
+from warp_springs.kernels.permuted import PERMUTED, permutation, permuted_scratch
 
 __all__ = ["strand_passes", "strand_scratch", "strand_width"]
 
@@ -24,11 +25,13 @@ def strand_width(precision: str) -> int:
 def strand_scratch(features, masses: int, springs: int) -> int:
     """Scratch values that the largest robot of a slice needs."""
     width = strand_width(features.precision)
+    surfaces = max(1, features.obstacles)
+    permuted = permuted_scratch(masses + width, springs, width, surfaces)
     masses, springs = masses + width, springs + 2 * width
     state = 24 if features.precision == "mixed" else 16
-    values = (state + max(1, features.obstacles)) * masses + 8 * springs
+    values = (state + surfaces) * masses + 8 * springs
     indices = 2 * masses + 9 * springs  # no larger than a value each
-    return values + indices
+    return max(values + indices, permuted)
 
 
 def strand_passes(precision: str) -> str:
@@ -36,11 +39,18 @@ def strand_passes(precision: str) -> str:
     width = strand_width(precision)
 
     return f"""
+bool permuted = false;
 auto pass = [&](int job, scalar time, bool start, bool last) {{
     {vector_dialect(precision, width)}
     {_ORIGIN}
     {LAW}
     {quad_operations(width)}
+    {permutation(precision, width)}
+    const int MP = (M + W - 1) / W * W;
+    {_MOVE}
+    {PERMUTED}
+    if (job == 6) permuted = M <= MOST_MASSES && place_masses();
+    if (permuted) {{ step_permuted(); return; }}
     {_PASS}
 }};
 {_JOBS}
@@ -65,7 +75,7 @@ auto gradient_shift = [&]() { pass(4, scalar(0), false, false); };
 
 _PASS = r"""
 typedef scalar quad __attribute__((vector_size(4 * sizeof(scalar))));
-const int MP = (M + W - 1) / W * W, SP = (S + W - 1) / W * W;
+const int SP = (S + W - 1) / W * W;
 quad* const X = (quad*)scratch.data;
 quad* const V = X + MP;
 quad* const FQ = V + MP;
@@ -188,29 +198,36 @@ auto keep = [=](quad* to, Vec a, real pad) __attribute__((always_inline)) {
 };
 for (int i = 0; i < MP; i += W) {
     real iw, pad;
-    const Vec f = load(FQ + i, pad), x_here = load(X + i, iw);
-    const Vec low_x_here = MIXED ? load(low_X + i, pad) : Vec{};
-    Sum a = sum_of(&x_here, &low_x_here, 0);
+    const Vec f = load(FQ + i, pad);
+    Vec x_here = load(X + i, iw), low_x_here = MIXED ? load(low_X + i, pad) : Vec{};
+    Vec v_here = load(V + i, pad), low_v_here = MIXED ? load(low_V + i, pad) : Vec{};
+    Vec shifted = job == 5 && WATER ? load(at + i, pad) : Vec{};
+    move_row(f, &x_here, &low_x_here, &v_here, &low_v_here, &shifted, 0, iw,
+             left + (OBSTACLES ? OBSTACLES : 1) * (i / W));
+    if (job == 4) { keep(shifted_x + i, shifted, iw); continue; }
+    keep(X + i, x_here, iw);
+    keep(V + i, v_here, zero);
+    if (MIXED) { keep(low_X + i, low_x_here, zero); keep(low_V + i, low_v_here, zero); }
+}
+"""
+
+# What the forces f do to row i of masses, which lie side by side.
+_MOVE = r"""
+auto move_row = [&](Vec f, Vec* xs, Vec* low_xs, Vec* vs, Vec* low_vs, Vec* shifted, int i, real iw,
+                    real* left) __attribute__((always_inline)) {
+    Sum a = sum_of(xs, low_xs, i);
     Own own = {};
-    if (OBSTACLES) own.left_over = left + OBSTACLES * (i / W);
-    if (job == 4) {
-        keep(shifted_x + i, shifted_position(a, f, iw, own), iw);
-        continue;
-    }
-    const Vec v_here = load(V + i, pad), low_v_here = MIXED ? load(low_V + i, pad) : Vec{};
-    Sum u = sum_of(&v_here, &low_v_here, 0);
+    if (OBSTACLES) own.left_over = left;
+    if (job == 4) { shifted[i] = shifted_position(a, f, iw, own); return; }
+    Sum u = sum_of(vs, low_vs, i);
     if (EULER) move_mass_euler(a, u, f, iw, 0, own);
     else {
-        const Vec at_here = job == 5 && WATER ? from_here(load(at + i, pad), a) : in_world(a);
-        real rest = CHIN4 && GROUND && last ? left[i / W] : zero;
+        const Vec at_here = job == 5 && WATER ? from_here(shifted[i], a) : in_world(a);
+        real rest = CHIN4 && GROUND && last ? *left : zero;
         move_mass(a, u, f, at_here, iw, substeps, rest, time, start, last, 0, own);
-        if (CHIN4 && GROUND && !last) left[i / W] = rest;
+        if (CHIN4 && GROUND && !last) *left = rest;
     }
-    Vec x_then, low_x_then = {}, v_then, low_v_then = {};
-    keep_sum(&x_then, &low_x_then, 0, a);
-    keep_sum(&v_then, &low_v_then, 0, u);
-    keep(X + i, x_then, iw);
-    keep(V + i, v_then, zero);
-    if (MIXED) { keep(low_X + i, low_x_then, zero); keep(low_V + i, low_v_then, zero); }
-}
+    keep_sum(xs, low_xs, i, a);
+    keep_sum(vs, low_vs, i, u);
+};
 """
