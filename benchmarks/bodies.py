@@ -21,6 +21,8 @@ from evolve.encodings import ENCODINGS
 
 SCENE = ws.Scene(ground=ws.Ground(), damping=4.0)
 DT = 1e-3
+EVALUATIONS = 3
+"""Of each spring in a step of chin4."""
 BATCH = 1000
 """Genomes that are stepped together."""
 
@@ -64,7 +66,7 @@ def packing(options: argparse.Namespace) -> None:
     apart, built = rate(robots, options.duration, options.repeats)
     together, built_alike = rate(alike, options.duration, options.repeats)
     springs = sum(robot.n_springs for robot in robots)
-    simulating = springs / DT / apart
+    simulating = springs / DT * EVALUATIONS / apart
     _say(
         what="packing",
         robots=len(robots),

@@ -17,6 +17,7 @@ import numpy as np
 from warp_springs.body.elements import NONE
 from warp_springs.body.variants import Variants
 from warp_springs.engine.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
+from warp_springs.engine.curve import ranges
 from warp_springs.engine.element_packing import (
     PACKED_ELEMENTS,
     SHARED_ELEMENTS,
@@ -41,11 +42,13 @@ from warp_springs.engine.packing import (
     row_pairs,
     sort_rows,
 )
+from warp_springs.engine.merging import unions
+from warp_springs.engine.slots import Slots
 from warp_springs.engine.support import refuse_unsupported
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
-from warp_springs.kernels.traits import PLAIN, Traits
+from warp_springs.kernels.traits import MERGED, PLAIN, Traits
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.stability import Status
@@ -78,50 +81,12 @@ PACKED = (
 #: Springs whose coefficients are worked out at a time.
 PIECE = 8192
 
+#: What lanes of a bundle of different robots hold where one has no mass: far above the ground.
+NOBODY = {"positions": (0.0, 0.0, 1e6)}
+
 #: What robots that one kernel steps have in common: the width of their bundles, whether they
 #: actuate, their layout, their traits.
 Kind = tuple[int, bool, str, Traits]
-
-
-@dataclass(frozen=True)
-class Slots:
-    """Where each of N robots lives in the flat buffers; arrays of shape (N,).
-
-    Attributes:
-        bundle: Its bundle.
-        lane: Its lane in the bundle.
-        width: Lanes of the bundle.
-        state: Where the bundle starts in a buffer of positions.
-        first_lane: Where the bundle starts in a buffer with one value a lane.
-        masses: Number of masses M.
-        springs: Number of springs S.
-    """
-
-    bundle: np.ndarray
-    lane: np.ndarray
-    width: np.ndarray
-    state: np.ndarray
-    first_lane: np.ndarray
-    masses: np.ndarray
-    springs: np.ndarray
-
-    def unpack(self, buffer: np.ndarray, robot: int) -> np.ndarray:
-        """Block (M, 3) of one robot in a buffer of positions or velocities, float64."""
-        start, width = self.state[robot], self.width[robot]
-        block = buffer[start : start + 3 * self.masses[robot] * width]
-        return block.reshape(-1, 3, width)[:, :, self.lane[robot]].astype(np.float64)
-
-    def state_indices(self, robots: np.ndarray) -> np.ndarray:
-        """Where the positions of some robots are in their buffer, robot by robot, flat."""
-        counts = 3 * self.masses[robots]
-        component = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        start = np.repeat(self.state[robots] + self.lane[robots], counts)
-        return start + component * np.repeat(self.width[robots], counts)
-
-    def lane_indices(self, robots: np.ndarray | slice, columns: int) -> np.ndarray:
-        """Where values of some robots are, (n, columns), in a buffer with so many a lane."""
-        start = columns * self.first_lane[robots] + self.lane[robots]
-        return start[:, None] + np.arange(columns) * self.width[robots][:, None]
 
 
 @dataclass(frozen=True)
@@ -183,6 +148,7 @@ class Batch:
         self.levels = np.zeros(len(robots), np.int64)
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
+        self._rows: dict[int, np.ndarray] = {}  # of masses in bundles with more masses
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
         self._refused = np.zeros(len(robots), bool)  # their step is certainly unstable
 
@@ -243,13 +209,29 @@ class Batch:
                 if len(members):
                     strips[width, actuated, "lanes", traits].append(cohort.take(members))
         for actuated, ids in alone.items():
-            strips[1, actuated, "lanes", PLAIN].append(Strip.ragged(ids, [robots[i] for i in ids]))
+            for kind, strip in self._merged(Strip.ragged(ids, [robots[i] for i in ids])):
+                strips[kind[0], actuated, "lanes", kind[1]].append(strip)
         if by_hand:
             gathered.append(Strip.ragged(by_hand, [robots[i] for i in by_hand]))
         for cohort in gathered:
             for (actuated, layout), strip in self._gathered(cohort, robots):
                 strips[1, actuated, layout, traits_of(cohort.elements)].append(strip)
         return strips
+
+    def _merged(self, strip: Strip) -> Iterator[tuple[tuple[int, Traits], Strip]]:
+        """Robots that share their topology with nobody, in common bundles where that pays.
+
+        Where there are obstacles, a mass that is nobody's might touch one.
+        """
+        width = native_width(self._method.precision)
+        if width == 1 or self._scene.obstacles:
+            yield (1, PLAIN), strip
+            return
+        for _, alike in self._alike(strip):
+            part = strip.take(alike)
+            for members, union in unions(part, width):
+                some = replace(part.take(members), union=union)
+                yield (1, PLAIN) if union is None else (width, MERGED), some
 
     def _gathered(
         self, cohort: Strip, robots: Sequence[Robot]
@@ -326,10 +308,13 @@ class Batch:
         self._tables.append(self._describe(strip, width, columns, elements))
         for table in springs:
             self._append("coefficients", table)
+        if strip.union is not None:
+            row, partner = strip.union.rows, strip.union.partners
+            self._rows.update(zip(strip.ids.tolist(), strip.union.rows_by_robot(strip.masses)))
+        elif width > 1:
+            self._append("pairs", row_pairs(row, partner))
         self._append("rows", row)
         self._append("partners", partner)
-        if width > 1:
-            self._append("pairs", row_pairs(row, partner))
         fields, one = strip.fields, np.ones(n, np.int64)
         turn = fields["omega"] * method.spans(levels)
         oscillators = np.stack([0.0 * turn, 0.0 * turn + 1.0, np.cos(turn), np.sin(turn)], axis=1)
@@ -355,7 +340,11 @@ class Batch:
         for name, (values, rows) in per_robot.items():
             cast = values.astype(dtype_of(name, method.precision), copy=False)
             invalid |= not_finite(cast, rows)
-            self._append(name, lane_major(cast, n, width))
+            if strip.union is not None and rows is strip.masses:
+                nothing = np.array(NOBODY.get(name, (0.0,) * (cast.size // len(cast))), cast.dtype)
+                self._append(name, strip.union.lanes_of(cast, rows, False, nothing))
+            else:
+                self._append(name, lane_major(cast, n, width))
         self._pack_elements(strip, width, elements, order, row)
         if self._scene.collisions is not None:
             robot = self.robots[int(strip.ids[0])]
@@ -374,9 +363,10 @@ class Batch:
             "reaches2": reach**2,
             "states": self._birth(strip, invalid),
         }.items():
-            self._append(
-                name, lane_major(values.astype(dtype_of(name, method.precision)), n, width)
-            )
+            lanes = lane_major(values.astype(dtype_of(name, method.precision)), n, width)
+            if name == "states" and strip.union is not None and n % width:
+                lanes[n % width - width :] = Status.INVALID  # nobody's lanes
+            self._append(name, lanes)
 
     def _birth(self, strip: Strip, invalid: np.ndarray) -> np.ndarray:
         """Status of each robot before its first step, shape (n,)."""
@@ -392,6 +382,12 @@ class Batch:
             How many a spring has; the pieces, lane by lane; and which robots they are not finite
             for, shape (n,).
         """
+        if strip.union is not None:
+            table = coefficients(strip.fields, order, actuated)
+            cast = table.astype(real_dtype(self._method.precision), copy=False)
+            nothing = np.zeros(table.shape[1], cast.dtype)
+            pieces = [strip.union.lanes_of(cast, strip.counts, True, nothing)]
+            return table.shape[1], pieces, not_finite(cast, strip.counts)
         n, start = len(strip.ids), np.append(0, np.cumsum(strip.counts))
         bundles = max(1, PIECE // max(int(strip.counts.max()) * width, 1))
         pieces, invalid = [], np.zeros(n, bool)
@@ -445,14 +441,17 @@ class Batch:
         self, strip: Strip, width: int, columns: int, elements: dict[str, np.ndarray]
     ) -> np.ndarray:
         """The rows of the table of bundles for a strip."""
-        masses, counts = strip.masses[::width], strip.counts[::width]
+        masses, counts, union = strip.masses[::width], strip.counts[::width], strip.union
+        if union is not None:
+            masses, counts = union.masses, union.springs
+        shared = strip.shared
         blocks = {
             "state": ("positions", 3 * masses * width),
             "mass": ("inverse_masses", masses * width),
             "spring": ("coefficients", columns * counts * width),
             "lane": ("omegas", np.full(len(masses), width)),
-            "row": ("rows", 0 * masses if strip.shared else masses + 1),
-            "partner": ("partners", 0 * counts if strip.shared else counts),
+            "row": ("rows", 0 * masses if shared else masses + 1),
+            "partner": ("partners", 0 * counts if shared else counts),
             "pair": ("pairs", 0 * counts),
         }
         # Each bundle of a strip has as many values of its elements.
@@ -493,14 +492,26 @@ class Batch:
         self._parts.clear()
         bundle, lane, width = np.ascontiguousarray(self._slot.T)
         description = dict(zip(BUNDLE, self.bundles[bundle].T, strict=True))
+        fixed = isinstance(self.robots, Variants)
+        each = [self.robots.body] if fixed else self.robots
+        masses = np.array([robot.n_masses for robot in each])
+        springs = np.array([robot.n_springs for robot in each])
+        if fixed:
+            masses, springs = (np.repeat(count, len(bundle)) for count in (masses, springs))
+        first = np.cumsum(masses) - masses
+        rows = ranges(np.zeros_like(masses), masses)
+        for robot, own in self._rows.items():
+            rows[first[robot] : first[robot] + len(own)] = own
         self.slots = Slots(
             bundle=bundle,
             lane=lane,
             width=width,
             state=description["state"],
             first_lane=description["lane"],
-            masses=description["masses"],
-            springs=description["springs"],
+            masses=masses,
+            springs=springs,
+            first=first,
+            rows=rows,
         )
 
 

@@ -6,13 +6,18 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warp_springs.body.elements import NONE, Elements
 from warp_springs.body.variants import Variants
+from warp_springs.engine.curve import ranges
 from warp_springs.engine.element_packing import element_fields
 from warp_springs.robot import Robot
+
+if TYPE_CHECKING:
+    from warp_springs.engine.merging import Union
 
 __all__ = [
     "Strip",
@@ -49,6 +54,7 @@ class Strip:
         shared: Whether all robots share that topology.
         fields: Flat arrays over all masses or all springs, and ``omega`` (n,).
         elements: Elements whose structure all robots share; their values are in ``fields``.
+        union: How robots of different topologies share bundles, if they do.
     """
 
     ids: np.ndarray
@@ -58,6 +64,7 @@ class Strip:
     shared: bool
     fields: dict[str, np.ndarray]
     elements: Elements = NONE
+    union: Union | None = None
 
     @classmethod
     def stacked(
@@ -102,9 +109,11 @@ class Strip:
         return cls(np.asarray(ids), masses, counts, springs, False, fields)
 
     def take(self, members: np.ndarray) -> Strip:
-        """Some robots, in their order, of a strip whose robots share one topology."""
-        if len(members) == len(self.ids):
+        """Some robots of a strip, in the order of `members`."""
+        if len(members) == len(self.ids) and (np.diff(members) > 0).all():
             return self
+        if not self.shared:
+            return self._take_ragged(members)
         n, masses, counts = len(self.ids), self.masses[members], self.counts[members]
         fields = {
             name: values.reshape(n, -1, *values.shape[1:])[members].reshape(-1, *values.shape[1:])
@@ -112,6 +121,15 @@ class Strip:
         }
         ids = self.ids[members]
         return Strip(ids, masses, counts, self.springs, True, fields, self.elements)
+
+    def _take_ragged(self, members: np.ndarray) -> Strip:
+        masses, counts = self.masses[members], self.counts[members]
+        of_mass = ranges((np.cumsum(self.masses) - self.masses)[members], masses)
+        of_spring = ranges((np.cumsum(self.counts) - self.counts)[members], counts)
+        fields = {name: self.fields[name][of_mass] for name in MASS_FIELDS}
+        fields |= {name: self.fields[name][of_spring] for name in SPRING_FIELDS}
+        fields["omega"] = self.fields["omega"][members]
+        return Strip(self.ids[members], masses, counts, self.springs[of_spring], False, fields)
 
     @property
     def all_springs(self) -> np.ndarray:
@@ -130,8 +148,8 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     topologies = 1 if strip.shared else len(strip.ids)
     masses, counts = strip.masses[:topologies], strip.counts[:topologies]
     mass_start, spring_start = np.cumsum(masses) - masses, np.cumsum(counts) - counts
-    lower, higher = np.sort(strip.springs, axis=1).T
-    lower = lower + np.repeat(mass_start, counts)
+    lower = np.minimum(*strip.springs.T) + np.repeat(mass_start, counts)
+    higher = np.maximum(*strip.springs.T)
     step, along = np.diff(lower), np.diff(higher)
     in_rows = ((step > 0) | ((step == 0) & (along >= 0))).all()  # as the shapes make them
     order = slice(None) if in_rows else np.lexsort((higher, lower))

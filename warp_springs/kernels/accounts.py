@@ -8,8 +8,9 @@ ACCOUNTS = r"""
 // energy exactly, and a mass that sticks loses nothing.
 auto loss_work = [=](Vec lost, Vec before, Vec after, real w)
         __attribute__((always_inline)) -> real {
-    return (lost.x * (before.x + after.x) + lost.y * (before.y + after.y)
-            + lost.z * (before.z + after.z)) * scalar(0.5) / w;
+    const real work = (lost.x * (before.x + after.x) + lost.y * (before.y + after.y)
+                       + lost.z * (before.z + after.z)) * scalar(0.5) / w;
+    return MERGED ? select(w > zero, work, zero) : work;
 };
 // The accounts of the ledger [J], in the order of ``buffers.ACCOUNTS``: work of the breathing
 // springs, what damping, drag and friction took from a mass of inverse w, work from outside.

@@ -160,6 +160,9 @@ auto half_rest_force = [=](int s, real si, real co) __attribute__((always_inline
     return ACTUATED ? breathing(p[K * s + 1], p[K * s + 2], p[K * s + 3], si, co) : p[K * s + 1];
 };
 auto stiffness = [=](int s) -> real { return p[K * s]; };
+// Who of different robots has a mass, and a spring.
+auto has_mass = [=](int i) -> mask { return MERGED ? w[i] > zero : zero == zero; };
+auto has_spring = [=](int s) -> mask { return MERGED ? p[K * s] > zero : zero == zero; };
 // The force of spring s on its first mass, at a, whose other mass is at b.
 auto spring_force = [&](Vec a, Vec b, int s, real si, real co)
         __attribute__((always_inline)) -> Vec {
@@ -167,9 +170,10 @@ auto spring_force = [&](Vec a, Vec b, int s, real si, real co)
     if (SPECIAL) return special_force(d, s, si, co);
     const real length2 = squared_length(d.x, d.y, d.z), k = stiffness(s);
     const real h = half_rest_force(s, si, co);
-    if (LEDGER && ACTUATED)
-        power += breathing_power(length2, k, h,
-                                 breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega));
+    if (LEDGER && ACTUATED) {
+        const real rate = breathing_rate(p[K * s + 2], p[K * s + 3], si, co, omega);
+        power += select(has_spring(s), breathing_power(length2, k, h, rate), zero);
+    }
     const real pull = spring_pull(length2, k, h);
     return Vec{pull * d.x, pull * d.y, pull * d.z};
 };
@@ -194,14 +198,15 @@ auto diagnose = [=]() -> mask {
     mask fast = zero > zero, stretched = fast, deep = fast;
     for (int i = 0; i < M; ++i) {
         const Vec a = x[i], u = v[i];
-        poison += poison_of(a, u);
-        fast |= too_fast(u, a - good_x[i]);
-        if (GROUND) deep |= in_world(sum_of(x, low_x, i)).z < -depth_limit;
+        const mask here = has_mass(i);
+        poison += select(here, poison_of(a, u), zero);
+        fast |= here & too_fast(u, a - good_x[i]);
+        if (GROUND) deep |= here & (in_world(sum_of(x, low_x, i)).z < -depth_limit);
         if (OBSTACLES) deep |= depth_in_obstacles(a) > zero + depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
             const mask far = squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
-            stretched |= LIMITS ? far & is_whole(spring_of(s)) : far;
+            stretched |= LIMITS ? far & is_whole(spring_of(s)) : far & has_spring(s);
         }
     }
     const mask finite = poison == zero;
@@ -229,11 +234,17 @@ CONTROL = (
 // The origin follows a robot whose centre has left it by more than a quantum, in whole quanta.
 auto follow = [&]() {
     Vec center = {};
-    for (int i = 0; i < M; ++i) center = center + x[i];
+    real count = zero;
+    for (int i = 0; i < M; ++i) {
+        const mask here = has_mass(i);
+        center = center + Vec{select(here, x[i].x, zero), select(here, x[i].y, zero),
+                              select(here, x[i].z, zero)};
+        count += select(here, zero + scalar(1), zero);
+    }
     const real quantum = *(const real*)(model.quanta.data + lane_);
     const mask goes_on = ~stopped_lanes();
     auto way = [=](real sum) -> real {
-        const real middle = sum / (zero + scalar(M));
+        const real middle = sum / count;
         const mask away = __builtin_elementwise_abs(middle) > quantum;
         return select(away & goes_on, __builtin_elementwise_rint(middle / quantum) * quantum, zero);
     };
@@ -264,13 +275,15 @@ auto check = [&](long long n) {
             }
         stopped = stopped_lanes();
     }
+    mask kept = stopped;  // and a mass that is nobody's
     auto restore = [&](real& now, real& good) __attribute__((always_inline)) {
-        now = good = select(stopped, good, now);
+        now = good = select(kept, good, now);
     };
     auto restore_vec = [&](Vec& now, Vec& good) __attribute__((always_inline)) {
         restore(now.x, good.x); restore(now.y, good.y); restore(now.z, good.z);
     };
     for (int i = 0; i < M; ++i) {
+        kept = stopped | ~has_mass(i);
         restore_vec(x[i], good_x[i]);
         restore_vec(v[i], good_v[i]);
         if (MIXED) {
@@ -278,6 +291,7 @@ auto check = [&](long long n) {
             restore_vec(low_v[i], good_low_v[i]);
         }
     }
+    kept = stopped;
     for (int e = 0; LEDGER && e < ACCOUNTS; ++e) restore(ledger[e], good_ledger[e]);
     follow();
 };
@@ -419,7 +433,7 @@ for (int i = 0; i < M; ++i) {
     seen_here[i] = a;
     show(seen_x + 3 * i, a, origins);
     show(seen_v + 3 * i, u, nullptr);
-    const real m = (zero + scalar(1)) / w[i];
+    const real m = select(has_mass(i), (zero + scalar(1)) / w[i], zero);
     total_mass += widen(m);
     for (int c = 0; c < 3; ++c) center[c] += widen(m) * seen_x[3 * i + c];
     kinetic += kinetic_energy(u, m);
@@ -435,9 +449,10 @@ if (LEDGER) {
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = seen_here[partner[s]];
             const real length2 = squared_length(b.x - a.x, b.y - a.y, b.z - a.z);
-            springs += SPECIAL
+            const real stored = SPECIAL
                 ? special_energy(length2, spring_of(s), Instant{sine, cosine, omega, table})
                 : spring_energy(length2, stiffness(s), half_rest_force(s, sine, cosine));
+            springs += select(has_spring(s), stored, zero);
         }
     }
     energy[0] = kinetic; energy[1] = gravity; energy[2] = springs; energy[3] = ground;

@@ -92,7 +92,7 @@ auto sweep = [&](const Vec* where, auto move) __attribute__((always_inline)) {
     const real si = sine, co = cosine;
     const int* pair = pairs;
     int i = 0;
-    for (; W > 1 && !LEDGER && i + 1 < M; i += 2) {
+    for (; W > 1 && !LEDGER && !MERGED && i + 1 < M; i += 2) {
         Vec fa, fb;
         pair_force(where, i, pair, si, co, fa, fb);
         move(i, fa);

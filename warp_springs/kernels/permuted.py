@@ -1,11 +1,12 @@
 """One robot whose masses are the lanes and fit a few registers: partners by permutation.
 
-The masses lie in rows of W, those with the most springs first. Each spring is looked at from both of
-its ends: mass i goes through its own springs, W masses at a time, and finds the other end of each
-with a permutation of the registers that hold all positions. So nothing is gathered from memory,
-nothing is scattered, and no force is added to another mass's sum. A mass sees its partners in the
-order of the masses, as a bundle adds them; f d and f (-d) are the same but for the sign, so a
-robot's bits are those of ``kernels.lanes``.
+The masses lie in rows of W, those with the most springs first, so that those of a row have about as
+many; of as many springs the lowest last, so that few rows touch the ground. Each spring is looked
+at from both of its ends: the masses of a row go through their springs side by side, and find the
+other ends with a permutation of the registers that hold all positions. So nothing is gathered from
+memory, nothing is scattered, and no force is added to the sum of another mass. A mass sees its
+partners in the order of the masses, as a bundle adds them; f d and f (-d) are the same but for the
+sign, so a robot's bits are those of ``kernels.lanes``, wherever its masses lie.
 """
 
 from warp_springs.kernels.buffers import real_dtype
@@ -82,21 +83,29 @@ const int most_entries = 4 * S + MOST_ENTRIES_OF_ROWS;
 real* const listed = (real*)(places + most_entries / W);  // coefficients of each place
 int* const first_entry = (int*)(listed + (ACTUATED ? 4 : 2) * (most_entries / W));
 int* const place_of = first_entry + R + 1;  // of each mass
-int* const found = place_of + M;
+int* const found = place_of + 2 * M;
 const int COEFFICIENTS = ACTUATED ? 4 : 2;
 
-// Masses by their number of springs, those with the most first; whether there is room for them.
+// Masses by their number of springs and their height; whether there is room for their lists.
 auto place_masses = [=]() -> bool {
+    int* const order = place_of + M;
     for (int i = 0; i < M; ++i) found[i] = row[i + 1] - row[i];
     for (int s = 0; s < S; ++s) ++found[partner[s]];
-    int most = 0, at = 0, entries = 0;
-    for (int i = 0; i < M; ++i) most = found[i] > most ? found[i] : most;
-    for (int n = most; n >= 0; --n)
-        for (int i = 0; i < M; ++i)
-            if (found[i] == n) {
-                if (at % W == 0) { first_entry[at / W] = entries; entries += n; }
-                place_of[i] = at++;
-            }
+    int entries = 0;
+    for (int i = 0; i < M; ++i) {
+        int at = i;
+        for (; at > 0; --at) {
+            const int before = order[at - 1];
+            if (found[before] > found[i]) break;
+            if (found[before] == found[i] && !(x[before].z[0] < x[i].z[0])) break;
+            order[at] = before;
+        }
+        order[at] = i;
+    }
+    for (int at = 0; at < M; ++at) {
+        place_of[order[at]] = at;
+        if (at % W == 0) { first_entry[at / W] = entries; entries += found[order[at]]; }
+    }
     first_entry[R] = entries;
     return entries <= most_entries / W;
 };

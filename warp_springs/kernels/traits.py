@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-__all__ = ["PLAIN", "Traits"]
+__all__ = ["MERGED", "PLAIN", "Traits"]
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class Traits:
         limits: Breaking or yielding.
         timetable: Stiffness and rest length in time.
         colliding: Collisions; bundles are then of one robot, or of one world.
+        merged: Not an element, but bundles of robots of different topologies: a lane may lack a
+            mass, which then has no inverse mass, or a spring, which has no stiffness.
     """
 
     outer: bool = False
@@ -36,6 +38,7 @@ class Traits:
     limits: bool = False
     timetable: bool = False
     colliding: bool = False
+    merged: bool = False
 
     @property
     def special(self) -> bool:
@@ -66,4 +69,4 @@ class Traits:
         return "\n".join(lines)
 
 
-PLAIN = Traits()
+PLAIN, MERGED = Traits(), Traits(merged=True)
