@@ -27,6 +27,7 @@ from warp_springs.engine.element_packing import (
     spring_columns,
     traits_of,
 )
+from warp_springs.engine.merging import unions
 from warp_springs.engine.method import Method
 from warp_springs.engine.packing import (
     Strip,
@@ -42,7 +43,6 @@ from warp_springs.engine.packing import (
     row_pairs,
     sort_rows,
 )
-from warp_springs.engine.merging import unions
 from warp_springs.engine.slots import Slots
 from warp_springs.engine.support import refuse_unsupported
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
@@ -148,7 +148,7 @@ class Batch:
         self.levels = np.zeros(len(robots), np.int64)
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
-        self._rows: dict[int, np.ndarray] = {}  # of masses in bundles with more masses
+        self._rows: list[tuple[np.ndarray, np.ndarray]] = []  # robots, and places of their masses
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
         self._refused = np.zeros(len(robots), bool)  # their step is certainly unstable
 
@@ -310,7 +310,7 @@ class Batch:
             self._append("coefficients", table)
         if strip.union is not None:
             row, partner = strip.union.rows, strip.union.partners
-            self._rows.update(zip(strip.ids.tolist(), strip.union.rows_by_robot(strip.masses)))
+            self._rows.append((strip.ids, strip.union.mass_row))
         elif width > 1:
             self._append("pairs", row_pairs(row, partner))
         self._append("rows", row)
@@ -500,8 +500,8 @@ class Batch:
             masses, springs = (np.repeat(count, len(bundle)) for count in (masses, springs))
         first = np.cumsum(masses) - masses
         rows = ranges(np.zeros_like(masses), masses)
-        for robot, own in self._rows.items():
-            rows[first[robot] : first[robot] + len(own)] = own
+        for robots, own in self._rows:  # in bundles of more masses
+            rows[ranges(first[robots], masses[robots])] = own
         self.slots = Slots(
             bundle=bundle,
             lane=lane,

@@ -48,10 +48,6 @@ class Union:
     rows: np.ndarray
     partners: np.ndarray
 
-    def rows_by_robot(self, masses: np.ndarray) -> list[np.ndarray]:
-        """The places of the masses of each robot, of which there are so many."""
-        return np.split(self.mass_row, np.cumsum(masses)[:-1])
-
     def lanes_of(
         self, values: np.ndarray, counts: np.ndarray, springs: bool, nothing: np.ndarray
     ) -> np.ndarray:
@@ -114,7 +110,7 @@ class _Lattice:
         """The lattice of as many robots as possible; None where there is none."""
         masses, counts = strip.masses, strip.counts
         first = np.cumsum(masses) - masses
-        order, row, partner = sort_rows(strip)
+        _, row, partner = sort_rows(strip)
         lengths = np.diff(row)
         inner = np.ones(len(lengths), bool)
         inner[np.cumsum(masses + 1)[:-1] - 1] = False  # between two robots
@@ -154,7 +150,7 @@ class _Lattice:
         return cls(fits, sites, site, low, place[np.where(there, way, ways[0])], ways)
 
     def bundled(self, strip: Strip, width: int) -> tuple[np.ndarray, Union]:
-        """Those who fit, like beside like, and their bundles; without bundles that are too empty."""
+        """Those who fit, like beside like, and their bundles, but those that are too empty."""
         members = np.flatnonzero(self.fits)
         taken = strip.take(members)
         of_mass, of_spring = np.repeat(self.fits, strip.masses), np.repeat(self.fits, strip.counts)
