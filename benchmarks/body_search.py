@@ -30,8 +30,8 @@ from evolve.run import create_seeds, evolve_together, open_all
 from evolve.store import Store
 
 COMMON: Mapping[str, Any] = {
-    "population": 192,
-    "generations": 80,
+    "population": 96,
+    "generations": 32,
     "encoding.period": 1.0,
     "encoding.amplitude": 0.2,
     "task.fitness": "steady",
@@ -40,28 +40,40 @@ COMMON: Mapping[str, Any] = {
     "scene.damping": 4.0,
     "simulation.dt": 1e-3,
     "simulation.precision": "float32",
+    "task.second_look.candidates": 8,
+    "task.second_look.trials": 8,
 }
-HARMONIC = {"encoding.type": "harmonics", "encoding.harmonics": 3}
 GENETIC = {"optimizer.type": "genetic"}
-LEARNING = {"optimizer": {"type": "learning", "tries": 4, "lessons": 2}}
+HARMONICS = {"encoding.type": "harmonics", "encoding.harmonics": 3}
+WALKER = {
+    "body": {"shape": "voxels", "layers": [["#.#", "...", "#.#"], ["###", ".#.", "###"]]},
+    "encoding.most_masses": 64,
+    "encoding.most_springs": 400,
+}
 
 SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    "walker": ("walker", GENETIC),
-    "walker, harmonics": ("walker", GENETIC | HARMONIC),
-    "tripod": ("tripod", GENETIC | {"encoding.type": "direct"}),
-    "tripod, harmonics": ("tripod", GENETIC | HARMONIC),
-    "cube": ("cube", GENETIC),
-    "cube, harmonics": ("cube", GENETIC | HARMONIC),
-    "creature": ("creature", {}),
-    "creature, genetic": ("creature", GENETIC),
-    "critter": ("critter", {}),
-    "critter, genetic": ("critter", GENETIC),
-    "critter, learning": ("critter", LEARNING),
-    "jelly, genetic": ("jelly", GENETIC),
-    "blueprint, genetic": ("blueprint", GENETIC),
-    "strider, genetic": ("strider", GENETIC),
+    "walker, harmonics": ("walker", GENETIC | HARMONICS),
+    "walker, regions": ("walker", GENETIC | {"encoding.type": "regions"}),
+    "walker, direct": ("walker", GENETIC),
+    "cube, harmonics": ("cube", GENETIC | HARMONICS),
+    "walker, operators": (
+        "creature",
+        GENETIC | WALKER | {"encoding.body_rate": 0.0, "encoding.first_changes": 0},
+    ),
+    "creature from walker": (
+        "creature",
+        GENETIC | WALKER | {"encoding.body_rate": 0.15, "encoding.first_changes": 4},
+    ),
+    "creature": ("creature", GENETIC),
+    "critter": ("critter", GENETIC),
+    "strider": ("strider", GENETIC),
+    "creature, learning": (
+        "creature",
+        {"optimizer": {"type": "learning", "bodies": {"type": "genetic"}}},
+    ),
 }
-"""Name -> preset, and what differs from it; bodies are fixed in the first six."""
+"""Name -> preset, and what differs from it. "walker, operators" has the genes and the operators of
+"creature from walker", but its body stays as it is."""
 
 
 def runs_of(name: str, options: argparse.Namespace) -> list[Run]:
@@ -72,8 +84,8 @@ def runs_of(name: str, options: argparse.Namespace) -> list[Run]:
     else:
         preset, changes = SEARCHES[name]
         shorter = {"population": options.population, "generations": options.generations}
-        whole = dict(changes) | dict(COMMON) | shorter | {"simulation.threads": options.threads}
-        runs = create_seeds(load(preset, {**changes, **whole}), options.seeds, folder)
+        whole = {**changes, **COMMON, **shorter, "simulation.threads": options.threads}
+        runs = create_seeds(load(preset, whole), options.seeds, folder)
     evolve_together(runs, [lambda progress: None] * len(runs))
     for run in runs:
         with Store.open(run.record_path, write=True) as store:
@@ -127,8 +139,10 @@ def main() -> None:
         runs = runs_of(name, options)
         (group,) = groups(runs)
         found.append(replace(group, label=name))
+        settings = runs[0].config.encoding
+        fixed = runs[0].config.fixed_body or getattr(settings, "body_rate", 1.0) == 0.0
         seconds = time.perf_counter() - started
-        print(f"{row(name, group, runs[0].config.fixed_body)}  {seconds:.0f} s", flush=True)
+        print(f"{row(name, group, fixed)}  {seconds:.0f} s", flush=True)
     if options.draw is not None:
         draw(found, options.draw)
 

@@ -118,6 +118,10 @@ def performance(
             lambda t: np.interp(t, np.append(0.0, seconds), np.append(0.0, springs / 1e9)),
         ),
     )
+    # Evenly along the axis: where the pace changed, round numbers of seconds would overlap.
+    shown = np.linspace(0.0, float(springs[-1]), 6)
+    ticks = np.interp(shown, np.append(0.0, springs), np.append(0.0, seconds))
+    above.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
     above.set_xlabel("time [s]")
     return ax
 
