@@ -84,13 +84,15 @@ class Wish:
 Rule = Callable[[list[Bud]], list[Wish]]
 
 
-def grow(cells: Cells, seed: Tissue, rule: Rule, light: Light, material: float) -> Cells:
+def grow(
+    cells: Cells, seed: Tissue, rule: Rule, light: Light, material: float, least: int = 1
+) -> Cells:
     """Let a body grow from a first cell, one cell at a time.
 
     At every side of a cell the rule is asked once, when the cell appears; the side that wants most
     gets the next cell, if there is room for it. A side on the left and one on the right that want
     the same get one together or none. Growth ends when nobody wants, when the cells are as many as
-    may be, or when the material is used up.
+    may be, or when the material is used up; with few cells those that want least badly must.
 
     Args:
         cells: An empty body, which is filled and returned.
@@ -98,6 +100,7 @@ def grow(cells: Cells, seed: Tissue, rule: Rule, light: Light, material: float) 
         rule: What buds want.
         light: Where the lamp is.
         material: Sum of the lengths of all cells but the first [edges].
+        least: Cells up to which a body grows even if nobody wants.
     """
     depths, states, phases = [0], [0.0], [seed.phase]
     waiting: list[tuple[float, int, Bud, Wish]] = []
@@ -108,11 +111,12 @@ def grow(cells: Cells, seed: Tissue, rule: Rule, light: Light, material: float) 
             for side in range(SIDES)
         ]
         for bud, wish in zip(buds, rule(buds), strict=True):
-            if wish.urge > 0.0:
-                heapq.heappush(waiting, (-wish.urge, cell * SIDES + bud.side, bud, wish))
+            heapq.heappush(waiting, (-wish.urge, cell * SIDES + bud.side, bud, wish))
 
     ask(cells.seed(seed))
     while waiting and len(cells) < cells.most:
+        if waiting[0][0] >= 0.0 and len(cells) >= least:
+            break
         equals = _strongest(waiting)
         needed = sum(wish.length for _, wish in equals)
         if needed > material or len(cells) + len(equals) > cells.most:

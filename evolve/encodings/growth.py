@@ -33,6 +33,8 @@ class GrowthSettingsBase(PacedSettings, CellSettings):
 
     material: float = Field(12.0, gt=0.0)
     """Sum of the lengths of all cells but the first that a body may have [edges]."""
+    least_cells: int = Field(4, ge=1)
+    """Cells up to which a body grows even if its rule wants no more."""
     hidden: int = Field(6, ge=1, le=64)
     """Hidden neurons of the rule."""
 
@@ -107,7 +109,8 @@ class GrowingBody(CellGenes):
         genes = np.asarray(genome, np.float64)
         first = tissue(genes[self._sizes[-1] :][:TISSUE])
         rule = self._rule(genes)
-        return grow(self.cells(behind), first, rule, light, self.settings.material)
+        settings = self.settings
+        return grow(self.cells(behind), first, rule, light, settings.material, settings.least_cells)
 
     def _rule(self, genes: np.ndarray):
         """What buds want, by the network of one genome."""

@@ -22,13 +22,13 @@ def rng(seed):
     return np.random.Generator(np.random.Philox(seed))
 
 
-def grown(urge, light=AHEAD, material=100.0, most=6, **more):
+def grown(urge, light=AHEAD, material=100.0, most=6, least=1, **more):
     """A body whose rule says how much a bud wants to grow, and more of it."""
 
     def rule(buds):
         return [Wish(urge(bud), Tissue(), **more) for bud in buds]
 
-    return grow(Cells(0.1, most, 9.0), Tissue(), rule, light, material)
+    return grow(Cells(0.1, most, 9.0), Tissue(), rule, light, material, least)
 
 
 @pytest.mark.parametrize(
@@ -52,6 +52,12 @@ def test_the_strongest_wish_comes_first_and_nobody_grows_who_does_not_want():
 def test_growth_ends_with_the_material():
     for material, cells in [(0.9, 1), (1.3, 2), (3.8, 3), (3.95, 4)]:
         assert len(grown(lambda bud: float(bud.side == UP), material=material, length=1.3)) == cells
+
+
+def test_a_body_of_few_cells_grows_where_it_is_minded_least():
+    urges = {TIP: -0.2, UP: -0.8}
+    cells = grown(lambda bud: urges.get(bud.side, -1.0), least=3, most=9)
+    np.testing.assert_allclose(np.diff(cells.centres, axis=0), [(0.1, 0, 0)] * 2, atol=1e-9)
 
 
 def test_what_a_cell_is_told_is_sensed_by_those_that_grow_on_it():
