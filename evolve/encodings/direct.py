@@ -23,6 +23,9 @@ class DirectSettings(ActuationSettings):
     """Bounds of the genes and how they vary."""
 
     type: Literal["direct"] = "direct"
+    mutation_spread: float = Field(1.0, ge=0.0, le=3.0)
+    """Standard deviation of the logarithm of the step of each mutant: some are bold, some careful;
+    0 where all take `mutation_step`."""
     region_mutation: float = Field(0.5, ge=0.0, le=1.0)
     """Share of the mutations that shift all springs of a neighbourhood by the same amount."""
     region_crossover: float = Field(0.5, ge=0.0, le=1.0)
@@ -70,8 +73,10 @@ class DirectEncoding(FixedBody, ArrayGenomes):
         shift = rng.standard_normal((len(rows), kinds_of), dtype=np.float32)
         of_region = np.flatnonzero(in_region[rows])
         shift[of_region] = shared[rows[of_region]]
-        shift *= kinds.astype(np.float32)[rows]
-        genes = genomes[rows, :, springs] + np.float32(self.settings.mutation_step) * shift
+        bold = np.exp(self.settings.mutation_spread * rng.standard_normal(n, dtype=np.float32))
+        step = np.float32(self.settings.mutation_step) * bold
+        shift *= (step[:, None] * kinds)[rows]
+        genes = genomes[rows, :, springs] + shift
         mutants = genomes.copy()
         mutants[rows, :, springs] = folded(genes, self.on_circle)
         return mutants
