@@ -116,3 +116,18 @@ def test_a_body_without_springs_is_refused():
     point = ws.Robot(masses=1.0, positions=[[0, 0, 0]], springs=np.empty((0, 2)), stiffness=1.0)
     with pytest.raises(ValueError, match="needs a body with springs"):
         DirectEncoding(point, DirectSettings())
+
+
+def test_mutants_differ_in_how_bold_they_are():
+    spreads = []
+    for spread in (0.0, 1.0):
+        settings = DirectSettings(
+            region_mutation=0.0, mutation_step=1e-3, mutation_rate=1.0, mutation_spread=spread
+        )
+        encoding = DirectEncoding(BODY, settings)
+        genomes = np.full((500, *encoding.genome_shape), 0.5, np.float32)
+        shifts = encoding.mutate(genomes, rng(5)) - genomes
+        sizes = [np.std(one[one != 0.0]) for one in shifts]
+        assert np.median(sizes) == pytest.approx(1e-3, rel=0.15)
+        spreads.append(np.std(np.log(sizes)))
+    assert spreads[0] < 0.15 and spreads[1] == pytest.approx(1.0, rel=0.15)
