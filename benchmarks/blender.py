@@ -1,13 +1,15 @@
 """Animations in Blender: they open, play true to the simulation, and are looked at.
 
-    python3.11 -m venv blender && blender/bin/pip install bpy==5.0.1
-    python benchmarks/blender.py --blender blender/bin/python [--out DIR]
+    python benchmarks/blender.py [--out DIR] [--blender PYTHON]
 
-Blender comes as the package ``bpy``, which has its own Python version and needs an environment of
-its own. For every geometry a walking robot and a tumbling cube are exported, opened there, and the
-centres of the balls that Blender draws are compared with the simulated masses in several frames (of
-points, the points themselves). Pictures of the middle of each animation are written to DIR, by
-Cycles on the CPU, as ``skel.png``, ``points.png``, ``mesh.png`` and ``material.png``.
+Blender 5.0.1 comes from PyPI as the package ``bpy``, into an environment of its own, made once and
+kept in benchmarks/peers/.cache (1 GB). It exists for Python 3.11 alone: under another, name an
+interpreter that has it, ``python3.11 -m venv blender && blender/bin/pip install bpy==5.0.1``.
+
+For every geometry a walking robot and a tumbling cube are exported, opened there, and the centres
+of the balls that Blender draws are compared with the simulated masses in several frames (of points,
+the points themselves). Pictures of the middle of each animation are written to DIR, by Cycles on
+the CPU, as ``skel.png``, ``points.png``, ``mesh.png`` and ``material.png``.
 """
 
 import argparse
@@ -18,6 +20,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from peers.environments import python_of
 
 FRAMES = (0, 11, 23, 45)
 CASES = {
@@ -93,22 +96,33 @@ def picture(bpy, path: Path) -> None:
     bpy.ops.render.render(write_still=True)
 
 
+def own_blender() -> Path:
+    """The interpreter of an environment with bpy, which is made if it is not there."""
+    try:
+        return python_of("blender")
+    except RuntimeError as error:
+        own = f"{sys.version_info[0]}.{sys.version_info[1]}"
+        sys.exit(
+            f"bpy 5.0.1 cannot be installed for this Python {own} ({error}); it exists for 3.11: "
+            "give --blender PYTHON, one that has it (see the top of this file)"
+        )
+
+
 def main() -> None:
     """Make the files here, and look at them there."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--blender", type=Path, help="a Python that has the package bpy")
+    parser.add_argument("--blender", type=Path, help="a Python that has bpy; default: made here")
     parser.add_argument("--out", type=Path, default=Path("out"), help="where pictures are written")
     parser.add_argument("--inside", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.inside:
         look(options.inside, options.out.resolve())
         return
-    if options.blender is None:
-        sys.exit("give --blender: a Python with bpy (see the top of this file)")
+    blender = options.blender or own_blender()
     options.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         make(Path(folder))
-        command = [options.blender, __file__, "--inside", folder, "--out", options.out]
+        command = [blender, __file__, "--inside", folder, "--out", options.out]
         sys.exit(subprocess.run(command, check=False).returncode)
 
 

@@ -12,12 +12,15 @@ __all__ = ["CACHE", "REQUIREMENTS", "python_of"]
 CACHE = Path(__file__).parent / ".cache"
 
 #: What each library's programs need; libraries that are not named run in this very environment.
+#: The last two draw, for render.py and blender.py.
 REQUIREMENTS = {
     "numpy": ("numpy==2.4.6",),
     "numba": ("numba==0.68.1", "numpy==2.4.6"),
     "jax": ("jax==0.10.2", "jaxlib==0.10.2", "numpy==2.4.6"),
     "taichi": ("taichi==1.7.4", "numpy==2.4.6"),
     "newton": ("newton==1.8.0", "warp-lang==1.19.0", "numpy==2.4.6"),
+    "pyvista": ("pyvista==0.49.1", "vtk==9.7.2", "numpy==2.4.6"),
+    "blender": ("bpy==5.0.1",),
 }
 
 

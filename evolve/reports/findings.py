@@ -86,5 +86,5 @@ def _ranking(several: Sequence[Group], unit: str) -> Iterator[str]:
     shared = min(int(curve.evaluations[-1]) for curve in curves)
     at = [float(np.interp(shared, c.evaluations, c.mean)) for c in curves]
     order = np.argsort([-np.inf if np.isnan(v) else v for v in at])[::-1]
-    words = ", ".join(f"{several[i].label} {at[i]:.3f}" for i in order)
-    yield f"After {shared:,} evaluations, means of the best so far in {unit}: {words}."
+    words = "; ".join(f"{several[i].label}: {at[i]:.3f}" for i in order)
+    yield f"After {shared:,} evaluations, means of the best so far in {unit} are {words}."

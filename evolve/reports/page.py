@@ -197,7 +197,8 @@ def _champion(report: ws.Document, subject: Subject) -> None:
         parts = []
         for name, words in pair:
             page = figure(6.8, 4.3)
-            getattr(ws.plots, name)(page.subplots(), subject.film, 0)
+            called = {"name": f"#{subject.zoo[0]}"} if name == "speed" else {}
+            getattr(ws.plots, name)(page.subplots(), subject.film, 0, **called)
             parts.append(report.plot(page, words))
         report.row(*parts)
 
@@ -216,7 +217,7 @@ def _zoo(report: ws.Document, subject: Subject) -> None:
     if subject.finalists:
         report.table(
             [
-                (f"#{f.id}", f.generation, f.fitness, share(f.halved_kept),
+                (f"#{f.id}", f.generation, f"{f.fitness:.3f}", share(f.halved_kept),
                  share(f.perturbed_kept), "yes" if f.survives else "no")
                 for f in subject.finalists if f.id in subject.zoo
             ],
@@ -258,7 +259,7 @@ def _comparison(report: ws.Document, subject: Subject, several: Sequence[Group])
         crowned = [seed.champion.perturbed for seed in group.seeds if seed.champion]
         least = min(len(seed.record.ids) for seed in group.seeds)
         rows.append((
-            group.label, len(bests), least, mean, error, float(np.max(bests)),
+            group.label, len(bests), least, f"{mean:.3f}", error, f"{np.max(bests):.3f}",
             f"{np.mean(crowned):.3f}" if crowned else "not looked at twice",
         ))  # fmt: skip
     report.table(
@@ -289,12 +290,13 @@ def _parameters(report: ws.Document, subject: Subject, store: Store) -> None:
 
 def _again(report: ws.Document, subject: Subject, runs: Sequence[Run], store: Store) -> None:
     report.section("Make it again")
-    folders = " ".join(map(_folder, runs))
     report.code(
         f"evolve run {_folder(subject.run)}/run.toml --out again",
-        f"evolve digest again        # {dict(results(store, subject.run.config))['digest']}",
+        "evolve digest again",
+        f"# {dict(results(store, subject.run.config))['digest']}",
         "evolve report again",
-        f"evolve report {folders}    # this file",
+        "# this file:",
+        " \\\n  ".join(["evolve report", *map(_folder, runs)]),
     )
     report.text(
         "The digest is a hash of everything the run decided: the same configuration on the same "

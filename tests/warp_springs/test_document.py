@@ -71,6 +71,17 @@ def test_numbers_stand_to_the_right(page):
     assert page.evaluate("document.querySelectorAll('tbody tr td')[4].textContent") == "2,000"
 
 
+def test_columns_of_numbers_in_words_stand_to_the_right_too():
+    report = ws.Document("table")
+    header = ("robot", "speed", "kept", "error", "size")
+    rows = [("#12", "0.470", "97%", "one seed", "3 m"), ("#7", 0.5, "stopped", "1e-3", "4 m")]
+    report.table(rows, header)
+    text = report.html()
+    right = [f'<{tag} class="number">{words}</{tag}>' in text
+             for tag, words in [("th", name) for name in header] + [("td", "stopped")]]  # fmt: skip
+    assert right == [False, True, True, True, False, True]
+
+
 def test_a_page_in_it_is_shown_and_is_kept_off_the_paper(page):
     box = page.evaluate(
         "(() => { const f = document.querySelector('iframe');"

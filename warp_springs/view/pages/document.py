@@ -5,9 +5,11 @@ from __future__ import annotations
 import base64
 import html
 import io
+import operator
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +32,10 @@ MOST_FILM = 900_000
 MOST_PAGE = 1_600_000
 """Letters that a page of robots in a document takes at most, unless it shows one robot."""
 
+SHORT_TABLE = 12
+"""Rows of a table that are not torn apart by the end of a sheet of paper."""
+
+_NUMBER = re.compile(r"[-\u2212+]?[\d,]*\.?\d+(e[-+]?\d+)? ?%?")
 _NAMED_GROUP = re.compile(r' id="[A-Za-z][\w.]*_\d+"')
 """Names that matplotlib gives to the parts of every figure, the same in each; nothing uses them."""
 
@@ -101,19 +107,26 @@ class Document:
         header: Sequence[str] = (),
         caption: str = "",
     ) -> None:
-        """A table; numbers stand to the right, texts to the left."""
+        """A table; numbers stand to the right, texts to the left.
+
+        Args:
+            rows: Cells, row by row. A column of numbers may hold them as texts ("0.48", "97%"),
+                and words where there is none.
+            header: Names of the columns.
+            caption: What it shows.
+        """
         top = f"<caption>{html.escape(caption)}</caption>" if caption else ""
         rows = [list(row) for row in rows]
+        numeric = [_is_numeric(column) for column in zip(*rows, strict=True)] if header else []
         if header:
-            numeric = [all(isinstance(row[i], (int, float)) for row in rows) for i in
-                       range(len(header))]  # fmt: skip
-            cells = (
-                f"<th{' class=number' if n and rows else ''}>{html.escape(name)}</th>"
-                for name, n in zip(header, numeric, strict=True)
-            )
-            top += f"<thead><tr>{''.join(cells)}</tr></thead>"
-        body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
-        self._body.append(f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>')
+            numeric = numeric or [False] * len(header)
+            heads = map(_cell, header, numeric, repeat("th"))
+            top += f"<thead><tr>{''.join(heads)}</tr></thead>"
+        body = "".join(
+            f"<tr>{''.join(map(_cell, row, numeric or map(_is_number, row)))}</tr>" for row in rows
+        )
+        kind = "scroll short" if len(rows) <= SHORT_TABLE else "scroll"
+        self._body.append(f'<div class="{kind}"><table>{top}<tbody>{body}</tbody></table></div>')
 
     def code(self, *lines: str) -> None:
         """Lines as they are typed."""
@@ -304,11 +317,23 @@ def _svg(figure: Figure, salt: str) -> str:
     return _NAMED_GROUP.sub("", re.sub(r"\n\s*", "\n", drawing))
 
 
-def _cell(value: Cell) -> str:
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        words = f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
-        return f'<td class="number">{words}</td>'
-    return f"<td>{html.escape(str(value))}</td>"
+def _cell(value: Cell, right: bool, tag: str = "td") -> str:
+    if _is_number(value):
+        value = f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
+    start = f'<{tag} class="number">' if right else f"<{tag}>"
+    return f"{start}{html.escape(str(value))}</{tag}>"
+
+
+def _is_number(value: Cell) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _is_numeric(column: Sequence[Cell]) -> bool:
+    """Whether a column is one of numbers: some are, and the others are words without any digit."""
+    texts = [str(value) for value in column]
+    numbers = [_NUMBER.fullmatch(text) is not None for text in texts]
+    words = [not any(map(str.isdecimal, text)) for text in texts]
+    return any(numbers) and all(map(operator.or_, numbers, words))
 
 
 def _base64(data: bytes | os.PathLike[str]) -> str:

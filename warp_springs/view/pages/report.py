@@ -124,7 +124,8 @@ def _plots(report: Document, result: Result, robot: int, name: str) -> None:
     for plot, caption in PLOTS.items():
         if plot not in missing:
             page = plots.figure(6.8, 4.3)
-            getattr(plots, plot)(page.subplots(), result, robot)
+            called = {"name": name} if plot == "speed" else {}
+            getattr(plots, plot)(page.subplots(), result, robot, **called)
             drawn.append(report.plot(page, caption))
     for first in range(0, len(drawn), 2):
         report.row(*drawn[first : first + 2])

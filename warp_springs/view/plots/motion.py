@@ -38,7 +38,7 @@ def height(ax: Axes, result: Result, robot: int = 0) -> Axes:
     return style.over_time(ax, result, "height of the centre of mass [m]")
 
 
-def speed(ax: Axes, result: Result, robot: int = 0) -> Axes:
+def speed(ax: Axes, result: Result, robot: int = 0, *, name: str | None = None) -> Axes:
     """Draw the speed of a robot's centre of mass [m/s] over time.
 
     The thin line is the speed between neighbouring frames. For a robot with muscles the thick line
@@ -48,6 +48,7 @@ def speed(ax: Axes, result: Result, robot: int = 0) -> Axes:
         ax: Axes to draw into.
         result: A run with ``fps=``.
         robot: Index of a recorded robot.
+        name: What the legend calls it; "robot 0" by default.
 
     Raises:
         ValueError: The robot was not recorded, or in fewer than two frames.
@@ -56,18 +57,18 @@ def speed(ax: Axes, result: Result, robot: int = 0) -> Axes:
     way, times = style.centers_of_mass(result, robot), result.times
     if len(times) < 2:
         raise ValueError(f"result: a speed needs two frames, {len(times)} were recorded")
-    color = _next_color(ax)
+    color, name = _next_color(ax), f"robot {robot}" if name is None else name
     between = (times[1:] + times[:-1]) / 2
     now = np.linalg.norm(np.diff(way, axis=0), axis=1) / np.diff(times)
     body = result.robots[robot]
     cycle = 2 * math.pi / abs(body.omega) if body.omega and body.is_actuated else math.inf
     if cycle < times[-1] - times[0]:
-        ax.plot(between, now, color=color, linewidth=0.9, alpha=0.5, label=f"robot {robot}")
+        ax.plot(between, now, color=color, linewidth=0.9, alpha=0.5, label=name)
         mean = _progress(way, times, cycle)
         ax.plot(*mean, color=color, linewidth=2.4, label="progress over a cycle")
         style.legend_above(ax)
     else:
-        ax.plot(between, now, color=color, linewidth=1.6, label=f"robot {robot}")
+        ax.plot(between, now, color=color, linewidth=1.6, label=name)
     ax.set_ylim(bottom=0.0)
     return style.over_time(ax, result, "speed of the centre of mass [m/s]")
 
@@ -163,5 +164,6 @@ def _outline(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _next_color(ax: Axes) -> str:
     """The colour of the next robot that is drawn into the same axes."""
-    drawn = sum(line.get_label().startswith("robot") for line in ax.lines)
-    return style.SERIES[drawn % len(style.SERIES)]
+    used = {line.get_color() for line in ax.lines}
+    free = [color for color in style.SERIES if color not in used]
+    return free[0] if free else style.SERIES[len(ax.lines) % len(style.SERIES)]
