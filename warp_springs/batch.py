@@ -44,7 +44,6 @@ from warp_springs.engine.packing import (
     sort_rows,
 )
 from warp_springs.engine.slots import Slots
-from warp_springs.engine.support import refuse_unsupported
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
 from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
@@ -137,7 +136,6 @@ class Batch:
         layout_of: Callable[[int], str] = lambda masses: "lanes",
         bodies: Mapping[int, np.ndarray] | None = None,
     ) -> None:
-        refuse_unsupported(robots, scene, method.precision)
         self.robots, self._bodies = robots, bodies or {}
         self._scene, self._method, self._layout_of = scene, method, layout_of
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}

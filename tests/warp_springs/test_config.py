@@ -177,6 +177,102 @@ def test_elements_of_a_robot(scene):
     assert robot == expected.pushed([0, 1, 2, 3], (1, 0, 0), duration=0.1)
 
 
+def test_springs_of_a_robot(scene):
+    changes = {
+        "robot.waveforms": [{"values": [0, 0.1, 0, -0.1, 0], "omega": 3.0, "harmonics": 2}],
+        "robot.omegas": [{"omega": 5.0, "springs": [0]}],
+        "robot.curves": [{"stretch": [0.0, 0.1], "stiffness": [0.5, 1, 2], "springs": [1]}],
+        "robot.hardening": [{"cubic": 1e4, "springs": [2]}],
+        "robot.limits": [{"breaks": 1e6, "yields": 5e5, "area": 1e-4, "springs": [3]}],
+        "robot.stiffness": [{"times": [0, 1], "factors": [1, 2], "period": 2, "springs": [4]}],
+        "robot.winches": [{"times": [0, 1], "offsets": [0, 0.1], "period": 2, "springs": [5]}],
+    }
+    (robot,) = scene(changes=changes).build_robots()
+    wave = ws.Waveform.fit([0, 0.1, 0, -0.1, 0], harmonics=2)
+    expected = (
+        ws.shapes.cube()
+        .with_waveform(wave, 3.0)
+        .with_omegas(5.0, [0])
+        .with_curve([0.0, 0.1], [0.5, 1, 2], [1])
+        .with_hardening(1e4, [2])
+        .with_limits(1e6, 5e5, [3], area=1e-4)
+        .with_stiffness_in_time([0, 1], [1, 2], [4], period=2)
+        .with_winch([0, 1], [0, 0.1], [5], period=2)
+    )
+    assert robot == expected
+
+
+SEEKER = """
+name = "seeker"
+
+[robot]
+body.shape = "cube"
+rotation = {angle = 1.0}
+position = [0.0, 0.0, 0.01]
+
+[[robot.controllers]]
+springs = [0, 1, 5]
+outputs = [0, 0, 1]
+hidden = 2
+recurrent = true
+reach = 0.3
+rate = 50.0
+seed = 3
+spread = 0.5
+sensors = [
+    {type = "contact", box = [[-1, -1, -1], [1, 1, 0.01]]},
+    {type = "force", masses = [0], full = 5.0},
+    {type = "length", springs = [3], full = 0.1},
+    {type = "velocity", full = 2.0},
+    {type = "tilt"},
+    {type = "goal", place = [1, 2, 0], full = 3.0, motion = [0.1, 0, 0]},
+    {type = "light", masses = [1, 2], place = [0, 1, 1], full = 0.5},
+    {type = "clock", period = 0.4},
+]
+
+[[robot.controllers]]
+springs = [7]
+hidden = 0
+weights = [0.25, -0.5, 1.0]
+sensors = [{type = "clock", period = 1.0}]
+
+[simulation]
+duration = 0.2
+"""
+
+
+def test_closed_loops(scene):
+    config = scene(SEEKER)
+    (robot,) = config.build_robots()
+    s = ws.sensors
+    first = ws.Controller(
+        sensors=[
+            s.contact([0, 2, 4, 6]),
+            s.force([0], 5.0),
+            s.length([3], 0.1),
+            s.velocity(2.0),
+            s.tilt(),
+            s.goal((1, 2, 0), 3.0, (0.1, 0, 0)),
+            s.light([1, 2], (0, 1, 1), 0.5),
+            s.clock(0.4),
+        ],
+        muscles=[0, 1, 5],
+        outputs=[0, 0, 1],
+        hidden=2,
+        recurrent=True,
+        reach=0.3,
+        rate=50.0,
+    )
+    first = first.replace(weights=0.5 * np.random.default_rng(3).normal(size=first.n_weights))
+    second = ws.Controller([s.clock(1.0)], [7], [0.25, -0.5, 1.0], hidden=0)
+    expected = ws.shapes.cube().controlled(first).controlled(second)
+    expected = expected.rotated((0, 0, 1), 1.0).moved((0, 0, 0.01))
+    assert robot == expected
+    result, direct = config.run(), ws.Simulation(expected, ws.Scene()).run(0.2)
+    assert np.array_equal(result.signals(0), direct.signals(0)) and np.any(result.signals(0))
+    assert np.array_equal(result.positions(0), direct.positions(0))
+
+
 def test_everything_of_a_scene(scene):
     changes = {
         "scene.drag": 0.1,
@@ -214,7 +310,7 @@ def test_random_orientations_are_uniform(scene):
 # -- text ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("text", [MINIMAL, RICH])
+@pytest.mark.parametrize("text", [MINIMAL, RICH, SEEKER])
 def test_a_scene_survives_being_written(scene, text):
     config = scene(text)
     again = parse(SceneFile, dump(config), "copy")
@@ -248,6 +344,13 @@ MISTAKES = [
     ({"robot.actuation": {"phase": [1, 2]}}, "actuation.phase: 2 given, for 28 springs"),
     ({"robot.body": {"shape": "saved", "path": "x.npz"}}, "x.npz"),
     ({"robot.body": {"shape": "mesh", "path": "x.stl"}}, "x.stl: there is no such file"),
+    ({"robot.controllers": [{"sensors": []}]}, "robot.controllers.0.sensors: tuple should have"),
+    ({"robot.controllers": [{"sensors": [{"type": "nose"}]}]}, "0.sensors.0.type must be one of"),
+    (
+        {"robot.controllers": [{"sensors": [{"type": "tilt"}], "weights": [1.0]}]},
+        "robot: weights: shape (1,) given, (276,) expected",
+    ),
+    ({"robot.winches": [{"times": [0, 0], "offsets": [0, 1]}]}, "robot: times"),
     ({"robots": [{"body": {"shape": "cube"}}]}, "give either one [robot] or several [[robots]]"),
     (
         {"scene.ground.material": ["ice", "cheese"]},

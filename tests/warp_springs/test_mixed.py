@@ -115,3 +115,89 @@ def test_what_goes_wrong_is_stopped_and_its_neighbours_do_not_notice():
     alone = end(good, scene, 0.2)
     for index in (0, 4):
         np.testing.assert_array_equal(result.positions(index), alone.positions(0))
+
+
+FAR = np.array([1024.0, -2048.0, 8.0])
+NORMAL = np.array([1.0, -1.0, 3.0]) / np.sqrt(11.0)
+
+
+def puppet(at):
+    """Breathes, lies on a box, and is fixed, held and tethered at the rest of its masses."""
+    body = ws.shapes.lattice(3, 1, 1, stiffness=2000.0).breathing(0.05, 4.0 * np.pi, phase=0.3)
+    x = body.positions
+    body = (
+        body.fixed([0])
+        .held_to(ws.Sphere(x[13] + (0.0, 0.0, 0.4), 0.4), [13])
+        .held_to(ws.Circle(x[15] + (0.0, 0.18, 0.24), (1.0, 0.0, 0.0), 0.3), [15])
+        .held_to(ws.Line(x[8], (1.0, 2.0, 0.5)), [8])
+        .held_to(ws.Plane(NORMAL, x[11] @ NORMAL), [11])
+        .tethered([12], 30.0, point=(0.5, 0.3, 0.2))
+    )
+    return body.moved(at)
+
+
+def theatre(at):
+    """What stands around the puppet: the same wherever that is."""
+    place = np.asarray(at, float)
+    waves = 0.01 * np.cos(np.arange(12.0)).reshape(3, 4)
+    return ws.Scene(
+        ground=None,
+        obstacles=(
+            ws.Box(place + np.array((0.1, 0.1, -0.11)), (0.3, 0.3, 0.2)),
+            ws.Sphere(place + np.array((0.3, 0.1, -0.5)), 0.48),
+            ws.HeightField(waves, 0.2, origin=place + np.array((-0.1, -0.1, -0.02))),
+            ws.Plane((0.0, -0.6, 0.8), 0.8 * (place[2] - 0.2) - 0.6 * place[1]),
+        ),
+        damping=2.0,
+    )
+
+
+def worst_distance(frames, at):
+    """How far a frame ever is from the constraints of the puppet."""
+    x = frames - np.asarray(at)
+    start = puppet((0.0, 0.0, 0.0)).positions
+    sphere, circle, line, plane = (x[:, i] for i in (13, 15, 8, 11))
+    along = np.array((1.0, 2.0, 0.5)) / np.linalg.norm((1.0, 2.0, 0.5))
+    found = [
+        np.linalg.norm(sphere - start[13] - (0.0, 0.0, 0.4), axis=1) - 0.4,
+        np.linalg.norm(circle - start[15] - (0.0, 0.18, 0.24), axis=1) - 0.3,
+        circle[:, 0] - start[15, 0],
+        np.linalg.norm(np.cross(line - start[8], along), axis=1),
+        (plane - start[11]) @ NORMAL,
+    ]
+    return max(np.abs(value).max() for value in found)
+
+
+def test_obstacles_constraints_and_tethers_are_exact_in_every_layout_and_everywhere():
+    def play(at, precision, layout="lanes", dt=DT):
+        options = {"precision": precision, "layout": layout}
+        simulation = ws.Simulation([puppet(at)] * 2, theatre(at), dt, **options)
+        result = simulation.run(0.75, fps=32, record=[1], energy=True)
+        assert (result.status == ws.Status.OK).all()
+        return result
+
+    truth = play(FAR, "float64", dt=DT / 16).frames(1)
+    coarse = play(FAR, "float64")
+    allowed = np.sqrt(((coarse.frames(1) - truth) ** 2).mean())
+    near = play((0.0, 0.0, 0.0), "mixed")
+    assert worst_distance(near.frames(1), (0.0, 0.0, 0.0)) < 1e-14
+    for layout in ("lanes", "flat", "block"):
+        far = play(FAR, "mixed", layout)
+        assert worst_distance(far.frames(1), FAR) < 1e-12
+        assert np.all(far.frames(1)[:, 0] == puppet(FAR).positions[0])
+        assert np.abs(far.frames(1) - FAR - near.frames(1)).max() < 3e-6
+        assert np.sqrt(((far.frames(1) - truth) ** 2).mean()) < 1.5 * allowed
+        assert np.abs(far.energy.residual - coarse.energy.residual).max() < 1e-4
+    moved = np.abs(far.frames(1)[-1] - puppet(FAR).positions).max(axis=1)
+    assert np.all(moved[1:] > 5e-4)
+
+
+def test_a_weight_on_a_tether_swings_far_away_as_it_must():
+    # Its closed form: half a period of pi sqrt(m / k) brings it to the other side.
+    mass = ws.Robot(
+        masses=[0.1], positions=[(0.3, 0, 0)], springs=np.empty((0, 2), int), stiffness=[]
+    )
+    swung = mass.tethered(0, 10.0, point=(0, 0, 0)).moved(FAR)
+    half = np.pi * np.sqrt(0.1 / 10.0)
+    result = end([swung] * 2, ws.Scene(gravity=(0, 0, 0), ground=None), half, dt=half / 256)
+    np.testing.assert_allclose(result.positions(1)[0] - FAR, (-0.3, 0, 0), atol=2e-7)

@@ -56,11 +56,11 @@ auto poison_of = [=](Vec x, Vec v) __attribute__((always_inline)) -> real {
 auto kinetic_energy = [=](Vec v, real m) __attribute__((always_inline)) -> real {
     return m * (v.x * v.x + v.y * v.y + v.z * v.z) * scalar(0.5);
 };
-auto gravity_energy = [=](Vec x, real m) __attribute__((always_inline)) -> real {
+auto gravity_energy = [=](const Place& x, real m) __attribute__((always_inline)) -> real {
     const real weight = -(m * (x.x * gravity_x + x.y * gravity_y + x.z * gravity_z));
     return WATER ? weight + buoyancy_energy(x.z, m) : weight;
 };
-auto contact_energy = [=](Vec x, const Own& own) __attribute__((always_inline)) -> real {
+auto contact_energy = [=](const Place& x, const Own& own) __attribute__((always_inline)) -> real {
     if (OBSTACLES) return obstacle_energy(x, own);
     return GROUND ? ground_force(x.z, own) * x.z * scalar(-0.5) : zero;
 };

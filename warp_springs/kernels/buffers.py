@@ -99,10 +99,10 @@ MODEL = {
     "coefficients": REAL,  # k, h, or k, ha, hs, hc of each sorted spring: N/m, N
     "omegas": np.float64,  # rad/s
     "outer_masses": np.int32,
-    "outer_values": REAL,  # force, 0, 0 of a push; point, stiffness, rest length of a tether
+    "outer_values": WIDE,  # force, 0, 0 of a push; point, stiffness, rest length of a tether
     "outer_windows": np.float64,  # start and end, s
     "skins": REAL,  # friction and stiffness, see Own in kernels.own
-    "bonds": REAL,  # constraints, likewise
+    "bonds": WIDE,  # constraints, likewise
     "spring_starts": np.int32,
     "spring_omegas": np.float64,  # rad/s, where springs have their own
     "times": np.float64,  # s

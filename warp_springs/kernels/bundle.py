@@ -105,11 +105,15 @@ auto enter_collisions = [](scalar) {};
 # The origin of the positions of each lane, as the law sees it.
 _ORIGIN = r"""
 real origins_here[3] = {};
+wide far_origins_here[3] = {};
 real* const origin = origins_here;
+wide* const far_origin = far_origins_here;
 double* const origins = state.origins.data + 3 * lane_;
 auto look_up_origin = [=]() {
-    for (int c = 0; MIXED && c < 3; ++c)
-        for (int l = 0; l < W; ++l) origin[c][l] = scalar(origins[c * W + l]);
+    for (int c = 0; MIXED && c < 3; ++c) {
+        for (int l = 0; l < W; ++l) far_origin[c][l] = wide_scalar(origins[c * W + l]);
+        origin[c] = narrow(far_origin[c]);
+    }
 };
 look_up_origin();
 """
@@ -202,7 +206,8 @@ auto diagnose = [=]() -> mask {
         poison += select(here, poison_of(a, u), zero);
         fast |= here & too_fast(u, a - good_x[i]);
         if (GROUND) deep |= here & (in_world(sum_of(x, low_x, i)).z < -depth_limit);
-        if (OBSTACLES) deep |= depth_in_obstacles(a) > zero + depth_limit;
+        if (OBSTACLES)
+            deep |= depth_in_obstacles(in_world(sum_of(x, low_x, i))) > zero + depth_limit;
         for (int s = row[i]; s < row[i + 1]; ++s) {
             const Vec b = x[partner[s]];
             const mask far = squared_length(b.x - a.x, b.y - a.y, b.z - a.z) > reach2;
@@ -383,7 +388,6 @@ auto choose_part = [=](Vec good, Vec now) -> Vec {
     return Vec{select(stopped, good.x, now.x), select(stopped, good.y, now.y),
                select(stopped, good.z, now.z)};
 };
-auto widen = [](real a) -> wide { return __builtin_convertvector(a, wide); };
 #if MIXED
 auto choose = [=](const Sum& good, const Sum& now) -> Sum {
     return Sum{choose_part(good, now), choose_part(good.low, now.low)};

@@ -5,6 +5,7 @@ of one lane, so that the same text serves robots that share their topology with 
 """
 
 import functools
+import re
 
 import warp as wp
 
@@ -41,6 +42,9 @@ def native_width(precision: str) -> int:
     return int(size.numpy()[0]) // real_dtype(precision).itemsize
 
 
+_SELECT = "real operator()(mask m, real a, real b) const { return m ? a : b; }"
+_VECTOR_ROOT = "real operator()(real a) const { return __builtin_elementwise_sqrt(a); }"
+
 # Bytes of a scalar, the integer of its size, TINY, and the processor's estimate of 1 / sqrt(a):
 # its name, the lanes of a whole register, and its mask's type.
 _TYPES = {
@@ -55,6 +59,25 @@ _SERIES = {
     "float32": "(h * y) * (scalar(3) - (a * y) * y)",
     "float64": "(h * y) * (scalar(2) + e * (scalar(1) + e * (scalar(0.75) + e * scalar(0.625))))",
 }
+
+
+def _on_both(name: str, own: str, root: str = "") -> str:
+    """C++ text: a function of the run's numbers, and in mixed precision of wide ones as well.
+
+    ``own`` is its text for the former, where ``ROOT`` is their square root, and ``root`` its name.
+    """
+    other = re.sub(r"\b(real|mask|scalar)\b", _wider, own).replace("ROOT", "::sqrt")
+    return f"""
+    struct {{
+        __attribute__((always_inline)) {own.replace("ROOT", root)}
+    #if MIXED
+        __attribute__((always_inline)) {other}
+    #endif
+    }} const {name}{{}};"""
+
+
+def _wider(found: re.Match) -> str:
+    return {"real": "wide", "mask": "wide_mask", "scalar": "wide_scalar"}[found[0]]
 
 
 def vector_dialect(precision: str, width: int) -> str:
@@ -72,13 +95,25 @@ def vector_dialect(precision: str, width: int) -> str:
     typedef integer mask __attribute__((vector_size({size * width})));
     typedef {"float" if wide == 4 * width else "double"} wide_scalar;
     typedef wide_scalar wide __attribute__((vector_size({wide}), aligned({min(wide, 64)})));
+    typedef {"long long" if wide == 8 * width else "int"} wide_mask
+        __attribute__((vector_size({wide})));
     const int W = {width};
     const scalar TINY = {tiny};
     const real zero = {{}};
-    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
+    const wide wide_zero = {{}};
+    {_on_both("select", _SELECT)}
+    {_on_both("square_root", _VECTOR_ROOT)}
+    {_on_both("lane_of", "scalar operator()(const real& a, int l) const { return a[l]; }")}
+    struct {{
+        __attribute__((always_inline)) real operator()(wide a) const {{
+            return __builtin_convertvector(a, real);
+        }}
+        __attribute__((always_inline)) mask operator()(wide_mask a) const {{
+            return __builtin_convertvector(a, mask);
+        }}
+    }} const narrow{{}};
+    auto widen = [](real a) -> wide {{ return __builtin_convertvector(a, wide); }};
     auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
-    auto square_root = [](real a) -> real {{ return __builtin_elementwise_sqrt(a); }};
-    auto lane_of = [](const real& a, int l) -> scalar {{ return a[l]; }};
     auto set_lane = [](real& a, int l, scalar value) {{ a[l] = value; }};
     auto less_over_root = [](real k, real h, real a) __attribute__((always_inline)) -> real {{
     #if defined(__AVX512F__) && defined(__AVX512VL__)
@@ -116,27 +151,35 @@ def scalar_dialect(precision: str) -> str:
     typedef {scalar} scalar;
     typedef {"float" if wide_dtype(precision).itemsize == 4 else "double"} wide_scalar;
     typedef scalar real;
+    typedef wide_scalar wide;
     typedef bool mask;
+    typedef bool wide_mask;
     const int W = 1;
     const scalar TINY = {tiny};
     const real zero = 0;
-    auto select = [](mask m, real a, real b) -> real {{ return m ? a : b; }};
+    const wide wide_zero = 0;
+    {_on_both("select", _SELECT)}
+    {_on_both("square_root", "real operator()(real a) const { return ROOT(a); }", _ROOT[name])}
+    {_on_both("lane_of", "scalar operator()(real a, int) const { return a; }")}
+    struct {{
+        __attribute__((always_inline)) real operator()(wide a) const {{ return real(a); }}
+        __attribute__((always_inline)) mask operator()(mask a) const {{ return a; }}
+    }} const narrow{{}};
+    auto widen = [](real a) -> wide {{ return a; }};
     auto any = [](mask m) -> bool {{ return m; }};
-    auto square_root = [](real a) -> real {{ return {_ROOT[name]}; }};
-    auto lane_of = [](real a, int) -> scalar {{ return a; }};
     auto set_lane = [](real& a, int, scalar value) {{ a = value; }};
     auto less_over_root = [](real k, real h, real a) -> real {{
     #if defined(__CUDA_ARCH__)
         {_DEVICE_ROOT[name]}
         return k - (h + h) * y;
     #else
-        return k - (h + h) / {_ROOT[name]};
+        return k - (h + h) / {_ROOT[name]}(a);
     #endif
     }};
     """
 
 
-_ROOT = {"float32": "::sqrtf(a)", "float64": "::sqrt(a)"}
+_ROOT = {"float32": "::sqrtf", "float64": "::sqrt"}
 # A GPU's own estimate errs by a bit or two in float32. In float64 the library's takes 1 / sqrt(a)
 # to the last bit.
 _DEVICE_ROOT = {

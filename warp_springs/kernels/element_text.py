@@ -4,10 +4,10 @@ __all__ = ["OWN_OF", "RATES"]
 
 OWN_OF = r"""
 const int* const outer_mass = model.outer_masses.data + outer_list_;
-const real* const outer_value = (const real*)(model.outer_values.data + outer_);
+const wide* const outer_value = (const wide*)(model.outer_values.data + outer_);
 const double* const outer_window = model.outer_windows.data + window_;
 const Vec* const skins = (const Vec*)(model.skins.data + skin_);
-const real* const bonds = (const real*)(model.bonds.data + bond_);
+const wide* const bonds = (const wide*)(model.bonds.data + bond_);
 Vec* const outer = (Vec*)(left_over + (OBSTACLES ? OBSTACLES : 1) * M);
 
 auto acting = [&](int e) __attribute__((always_inline)) -> real {
@@ -23,9 +23,10 @@ auto gather_outer = [&](const Vec* x) {
         const real part = acting(e);
         if (!any(part > zero)) continue;
         const int i = outer_mass[e];
-        const real* const o = outer_value + 5 * e;
-        Vec f = {o[0], o[1], o[2]};
-        if (e >= pushes_) f = tether_force(f - x[i], o[3], o[4]);
+        const wide* const o = outer_value + 5 * e;
+        const Far given = {o[0], o[1], o[2]};  // a force, or the point of a tether
+        const Vec f = e < pushes_ ? near_of(given)
+            : tether_force(way_from(x[i], given), narrow(o[3]), narrow(o[4]));
         outer[i] = outer[i] + scaled(f, part);
     }
 };
@@ -36,10 +37,10 @@ auto own_of = [=](int i) __attribute__((always_inline)) -> Own {
     if (OUTER) own.outer = outer[i];
     if (SKIN) own.skin = skins[i];
     if (BOUND) {
-        const real* const b = bonds + 10 * i;
-        own.diagonal = Vec{b[0], b[1], b[2]};
-        own.corner = Vec{b[3], b[4], b[5]};
-        own.centre = Vec{b[6], b[7], b[8]};
+        const wide* const b = bonds + 10 * i;
+        own.diagonal = Far{b[0], b[1], b[2]};
+        own.corner = Far{b[3], b[4], b[5]};
+        own.centre = Far{b[6], b[7], b[8]};
         own.radius = b[9];
     }
     return own;
@@ -64,7 +65,7 @@ auto find_rates = [&](const Vec* where, scalar time, bool start, auto sweep) {
     if (!EULER) {
         if (COLLIDING) collide(where, time, true, false);
         sweep(where, [&](int i, Vec f) {
-            const Vec at = in_world(sum_of(x, low_x, i));
+            const Place at = in_world(sum_of(x, low_x, i));
             const Vec a = kick_acceleration(f, at, w[i], own_of(i));
             middle_v[i] = before_v[i] + scaled(a, zero + time * scalar(0.5));
         });

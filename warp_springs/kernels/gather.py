@@ -27,10 +27,12 @@ import warp as wp
 from warp_springs.kernels.buffers import (
     ENERGIES,
     REAL,
+    WIDE,
     array_struct,
     real_dtype,
     real_type,
     struct_of,
+    wide_dtype,
 )
 from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.crowd_collisions import CROWD_COLLIDING, NO_CROWD_COLLIDING
@@ -106,10 +108,10 @@ MODEL = {
     "obstacles": np.float64,  # see kernels.buffers
     "heights": np.float64,
     "outer_sites": np.int32,  # first row and rows of the pushes and tethers of each slice
-    "outer_values": REAL,  # [row][6][slot], the last: whether it is a tether
+    "outer_values": WIDE,  # [row][6][slot], the last: whether it is a tether
     "outer_windows": np.float64,  # [row][2][slot], s
     "skins": REAL,  # [slice][3][slot]
-    "bonds": REAL,  # [slice][10][slot]
+    "bonds": WIDE,  # [slice][10][slot]
     "quanta": REAL,  # in which the origin of a robot moves, m; in mixed precision
 }
 #: What stepping changes.
@@ -249,10 +251,14 @@ _TABLES = {"robot": ROBOT, "site": SITE, "chunk": CHUNK}
 # The origin of the robot's positions, as the law sees it.
 _ORIGIN = r"""
 real origins_here[3] = {};
+wide far_origins_here[3] = {};
 real* const origin = origins_here;
+wide* const far_origin = far_origins_here;
 auto look_up_origin = [=](int robot) {
-    for (int c = 0; MIXED && c < 3; ++c)
-        origin[c] = zero + scalar(state.origins.data[3 * robot + c]);
+    for (int c = 0; MIXED && c < 3; ++c) {
+        far_origin[c] = wide_zero + wide_scalar(state.origins.data[3 * robot + c]);
+        origin[c] = narrow(far_origin[c]);
+    }
 };
 """
 
@@ -262,8 +268,8 @@ def gather_structs(precision: str, colliding: bool) -> tuple[type, type]:
     """The structs of what stays and of what stepping changes."""
 
     def struct(name: str, table: dict) -> type:
-        real = real_dtype(precision)
-        kinds = {key: real if kind is REAL else np.dtype(kind) for key, kind in table.items()}
+        known = {REAL: real_dtype(precision), WIDE: wide_dtype(precision)}
+        kinds = {key: np.dtype(known.get(kind, kind)) for key, kind in table.items()}
         return array_struct(name, kinds)
 
     if not colliding:

@@ -117,7 +117,7 @@ auto kick_and_drift = [&](bool shifted, scalar time, bool start, bool last)
     sweep(where, [&](int i, Vec f) __attribute__((always_inline)) {
         Sum a = sum_of(x, low_x, i), u = sum_of(v, low_v, i);
         real rest = CHIN4 && GROUND && last ? left_over[i] : zero;
-        const Vec at = shifted ? from_here(where[i], a) : in_world(a);
+        const Place at = shifted ? from_here(where[i], a) : in_world(a);
         move_mass(a, u, f, at, w[i], substeps, rest, time, start, last, ledger, own_of(i));
         if (CHIN4 && GROUND && !last) left_over[i] = rest;
         keep_sum(x, low_x, i, a);

@@ -9,6 +9,9 @@ A layout puts in front of ``LAW`` a dialect that defines
 ``select(m, a, b)``       ``m ? a : b``, lane by lane
 ``any(m)``                true if any lane of ``m`` is
 ``square_root(a)``        IEEE square root
+``wide``                  what holds a place in the world, with ``wide_scalar`` and ``wide_mask``:
+                          in mixed precision float64, else the same as ``real``
+``narrow``, ``widen``     from one to the other
 ``less_over_root(k, h,    k - 2 h / sqrt(a), the root to the last bit or two, for a >= TINY
 a)``
 ``MIXED``                 a macro, 0 or 1: whether positions and velocities are sums of two numbers,

@@ -20,14 +20,14 @@ auto slow_in_air = [=](Sum& v, real w, scalar time) __attribute__((always_inline
 auto slow_in_water = [=](Sum& v, real z, real w, scalar time) __attribute__((always_inline)) {
     if (WATER) drag_flow(v, v, w, immersed(z) * (water_drag * time));
 };
-auto slow_down = [=](Sum& v, Vec x, real w, scalar time, bool water_first, const Own& own,
+auto slow_down = [=](Sum& v, const Place& x, real w, scalar time, bool water_first, const Own& own,
                      Losses& losses) __attribute__((always_inline)) {
     if (!DRAG && !WATER) return;
     const Vec before = v;
     if (water_first) slow_in_water(v, x.z, w, time);
     slow_in_air(v, w, time);
     if (!water_first) slow_in_water(v, x.z, w, time);
-    if (BOUND && WIND) restrain(v, tangent(v, x, own));
+    if (BOUND && WIND) restrain(v, x, own);
     if (LEDGER) losses.drag = losses.drag + (before - v);
 };
 
@@ -47,12 +47,12 @@ const scalar FIRST_KICK = CHIN4 ? dt / scalar(6) : dt * scalar(0.5);  // half of
 const scalar GRADIENT_KICK = dt * scalar(2) / scalar(3);
 const scalar GRADIENT_SHIFT = dt * dt / scalar(24);
 
-auto kick_acceleration = [=](Vec f, Vec at, real w, const Own& own)
+auto kick_acceleration = [=](Vec f, const Place& at, real w, const Own& own)
         __attribute__((always_inline)) -> Vec {
     Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, GROUND ? f.z * w : f.z * w + gravity_z};
     if (OUTER || WATER) a = a + outer_acceleration(at.z, w, own);
     if (BOUND && GROUND)  // what flies on a great circle takes all forces here
-        a.z += select(is_round(own), ground_force(at.z, own) * w + gravity_z, zero);
+        a.z += select(narrow(is_round(own)), ground_force(at.z, own) * w + gravity_z, zero);
     return BOUND ? tangent(a, at, own) : a;
 };
 auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inline)) {
@@ -63,8 +63,8 @@ auto damp = [=](Sum& v, scalar part, Losses& losses) __attribute__((always_inlin
 };
 // The classroom's friction belongs to the kick, since it works on the force. The force f was taken
 // at `at`, which is x but for the gradient kick. Returns the acceleration without friction.
-auto kick = [=](Sum& v, Vec f, Vec at, Vec x, real w, scalar time, const Own& own, Losses& losses)
-        __attribute__((always_inline)) -> Vec {
+auto kick = [=](Sum& v, Vec f, const Place& at, const Place& x, real w, scalar time,
+                const Own& own, Losses& losses) __attribute__((always_inline)) -> Vec {
     Vec a = kick_acceleration(f, at, w, own);
     if (BOUND) a = tangent(a, x, own);
     const Vec whole = a;
@@ -79,12 +79,12 @@ auto kick = [=](Sum& v, Vec f, Vec at, Vec x, real w, scalar time, const Own& ow
     if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
     return whole;
 };
-auto lose_before = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
+auto lose_before = [=](Sum& v, const Place& x, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
     damp(v, loss, losses);
     slow_down(v, x, w, span * scalar(0.5), false, own, losses);
 };
-auto lose_after = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
+auto lose_after = [=](Sum& v, const Place& x, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
     slow_down(v, x, w, span * scalar(0.5), true, own, losses);
     damp(v, loss, losses);
@@ -94,7 +94,7 @@ auto lose_after = [=](Sum& v, Vec x, real w, const Own& own, Losses& losses)
 // the velocities before and after: second order.
 auto drift = [=](Sum& x, Sum& v, Vec a, real w, int substeps, real& left_over, bool last,
                  const Own& own, Losses& losses) __attribute__((always_inline)) {
-    const Vec x0 = x, v0 = v;
+    const Sum x0 = x, v0 = v;
     Vec mean = v;
     if (GROUND) touch_down(x, v, w, substeps, left_over, last, a.z, own, losses);
     else add_upright(x, v.z, span);
@@ -110,20 +110,20 @@ auto drift = [=](Sum& x, Sum& v, Vec a, real w, int substeps, real& left_over, b
 // The velocity at t_n, from the state before its kicks: what the last part of them adds. The state
 // has had its friction up to t_n; here friction only holds what sticks, so that it is reported at
 // rest.
-auto synchronise = [=](Sum& v, Vec f, Vec x, real w, const Own& own, Losses& losses)
+auto synchronise = [=](Sum& v, Vec f, const Place& x, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
     lose_before(v, x, w, own, losses);
     kick(v, f, x, x, w, FIRST_KICK, own, losses);
     if (GROUND)
         rub(v, ground_force(x.z, own) * w * FIRST_KICK, zero, own, losses, scalar(0));
     if (OBSTACLES) hold_by_obstacles(x, v, w, FIRST_KICK, own, losses);
-    if (BOUND) restrain(v, tangent(v, x, own));
+    if (BOUND) restrain(v, x, own);
 };
 
 // Symplectic Euler, the classroom's method: all forces at t_n, then velocity, then position.
 auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, const Own& own, Losses& losses)
         __attribute__((always_inline)) {
-    const Vec here = in_world(x);
+    const Place here = in_world(x);
     const real push = GROUND ? ground_force(here.z, own) * w : zero;
     Vec a = {f.x * w + gravity_x, f.y * w + gravity_y, f.z * w + gravity_z + push};
     if (OUTER || WATER) a = a + outer_acceleration(here.z, w, own);
@@ -138,10 +138,10 @@ auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, const Own& own, Losses& los
     if (GROUND && COURSE && LEDGER) losses.friction = losses.friction + (free - v);
     if (GROUND) rub(v, push * dt, push * dt, own, losses, kinetic_friction);
     if (OBSTACLES) push_by_obstacles(here, v, w, own, losses);
-    if (BOUND) restrain(v, tangent(v, here, own));
+    if (BOUND) restrain(v, here, own);
     damp(v, loss * (scalar(2) - loss), losses);
     slow_down(v, here, w, dt, false, own, losses);
-    const Vec x0 = x, v0 = v;
+    const Sum x0 = x, v0 = v;
     add(x, v, dt);
     if (BOUND) bind(x, v, x0, v0, own);
 };
@@ -149,10 +149,11 @@ auto euler_step = [=](Sum& x, Sum& v, Vec f, real w, const Own& own, Losses& los
 // One mass moved by its whole force f, taken at `at` in the world: a kick of `time` seconds and the
 // drift after it. `start`: nothing came before; `last`: the last drift of the step; `left_over`:
 // see touch_down.
-auto move_mass = [=](Sum& x, Sum& v, Vec f, Vec at, real w, int substeps, real& left_over,
-                     scalar time, bool start, bool last, real* ledger, const Own& own)
-        __attribute__((always_inline)) {
-    const Vec before = v, here = in_world(x);
+auto move_mass = [=](Sum& x, Sum& v, Vec f, const Place& at, real w, int substeps,
+                     real& left_over, scalar time, bool start, bool last, real* ledger,
+                     const Own& own) __attribute__((always_inline)) {
+    const Vec before = v;
+    const Place here = in_world(x);
     Losses losses = {}, rubbed = {};
     if (!start) lose_before(v, here, w, own, losses);
     const Vec a = kick(v, f, at, here, w, time, own, losses);
@@ -172,6 +173,7 @@ auto move_mass_euler = [=](Sum& x, Sum& v, Vec f, real w, real* ledger, const Ow
 auto shifted_position = [=](Sum x, Vec f, real w, const Own& own)
         __attribute__((always_inline)) -> Vec {
     add(x, kick_acceleration(f, in_world(x), w, own), GRADIENT_SHIFT);
-    return BOUND ? nearest(x, own) : x;
+    if (BOUND) x = sum_from(from_origin(nearest(exact_of(in_world(x)), own)));
+    return x;
 };
 """

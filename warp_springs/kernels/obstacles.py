@@ -56,33 +56,40 @@ TOUCHING = r"""
 // The distance of a point from the surface of an obstacle, negative inside, and the normal there.
 struct Touch { real gap; Vec n; };
 
-auto touch_plane = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
-    const Vec n = {zero + scalar(o[4]), zero + scalar(o[5]), zero + scalar(o[6])};
-    return Touch{dot(n, x) - scalar(o[7]), n};
+auto triple = [=](const double* o) __attribute__((always_inline)) -> Far {
+    return Far{wide_zero + wide_scalar(o[0]), wide_zero + wide_scalar(o[1]),
+               wide_zero + wide_scalar(o[2])};
 };
-auto touch_ball = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
-    const Vec d = {x.x - scalar(o[4]), x.y - scalar(o[5]), x.z - scalar(o[6])};
-    const real r = square_root(dot(d, d) + TINY);
-    return Touch{r - scalar(o[7]), scaled(d, (zero + scalar(1)) / r)};
+auto touch_plane = [=](const double* o, Far x) __attribute__((always_inline)) -> Touch {
+    const Far n = triple(o + 4);
+    return Touch{narrow(dot(n, x) - wide_scalar(o[7])), near_of(n)};
+};
+auto touch_ball = [=](const double* o, Far x) __attribute__((always_inline)) -> Touch {
+    const Far d = x - triple(o + 4);
+    const wide r = square_root(dot(d, d) + TINY);
+    return Touch{narrow(r - wide_scalar(o[7])),
+                 near_of(scaled(d, (wide_zero + wide_scalar(1)) / r))};
 };
 // Inside, the nearest face pushes; outside, only whether a face separates matters.
-auto touch_box = [=](const double* o, Vec x) __attribute__((always_inline)) -> Touch {
-    const Vec d = {x.x - scalar(o[4]), x.y - scalar(o[5]), x.z - scalar(o[6])};
-    Touch best = {zero, {zero, zero, zero}};
+auto touch_box = [=](const double* o, Far x) __attribute__((always_inline)) -> Touch {
+    const Far d = x - triple(o + 4);
+    const wide one = wide_zero + wide_scalar(1);
+    wide best = wide_zero;
+    Far normal = {wide_zero, wide_zero, wide_zero};
     for (int axis = 0; axis < 3; ++axis) {
-        const Vec e = {zero + scalar(o[10 + axis]), zero + scalar(o[13 + axis]),
-                       zero + scalar(o[16 + axis])};
-        const real along = dot(e, d);
-        const real gap = select(along < zero, -along, along) - scalar(o[7 + axis]);
-        const mask nearer = axis == 0 ? zero == zero : gap > best.gap;
-        const real sign = select(along < zero, zero - scalar(1), zero + scalar(1));
-        best.gap = select(nearer, gap, best.gap);
-        best.n = pick(nearer, scaled(e, sign), best.n);
+        const double axes[3] = {o[10 + axis], o[13 + axis], o[16 + axis]};
+        const Far e = triple(axes);
+        const wide along = dot(e, d);
+        const wide_mask under = along < wide_zero;
+        const wide gap = select(under, -along, along) - wide_scalar(o[7 + axis]);
+        const wide_mask nearer = axis == 0 ? wide_zero == wide_zero : gap > best;
+        best = select(nearer, gap, best);
+        normal = pick(nearer, scaled(e, select(under, wide_zero - one, one)), normal);
     }
-    return best;
+    return Touch{narrow(best), near_of(normal)};
 };
 // Bilinear between four grid points, flat beyond the rim; the distance is that from the tangent.
-auto touch_terrain = [=](const double* o, Vec x) -> Touch {
+auto touch_terrain = [=](const double* o, Far x) -> Touch {
     const double spacing = o[7];
     const int nx = (int)o[8], ny = (int)o[9];
     const double* const field = heights + (int64_t)o[10];
@@ -107,13 +114,14 @@ auto touch_terrain = [=](const double* o, Vec x) -> Touch {
     }
     return found;
 };
-auto touch = [=](const double* o, Vec x) -> Touch {
+auto touch = [=](const double* o, const Place& place) -> Touch {
     const int kind = (int)o[0];
+    const Far x = exact_of(place);
     if (kind == 0) return touch_plane(o, x);
     if (kind == 1) return touch_ball(o, x);
     return kind == 2 ? touch_box(o, x) : touch_terrain(o, x);
 };
-auto depth_in_obstacles = [=](Vec x) -> real {
+auto depth_in_obstacles = [=](const Place& x) -> real {
     real deepest = zero;
     for (int k = 0; k < OBSTACLES; ++k) {
         const real depth = -touch(obstacles + RECORD * k, x).gap;
@@ -121,7 +129,7 @@ auto depth_in_obstacles = [=](Vec x) -> real {
     }
     return deepest;
 };
-auto obstacle_energy = [=](Vec x, const Own& own) -> real {
+auto obstacle_energy = [=](const Place& x, const Own& own) -> real {
     real energy = zero;
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
@@ -146,16 +154,16 @@ auto rub_surface = [=](Vec u, real hold, real impulse, const Own& own, const dou
 // A mass that its drift took from `from` to x, after a kick by the acceleration a, is stopped and
 // turned by the obstacles it meets. Gravity, a kick here, acts together with their forces, so that
 // a mass at rest stays at rest.
-auto meet_obstacles = [=](Vec& x, Vec& v, Vec from, Vec a, real w, int substeps, bool last,
+auto meet_obstacles = [=](Sum& x, Sum& v, const Sum& from, Vec a, real w, int substeps, bool last,
                           const Own& own, Losses& losses) {
     const Vec gravity = {zero + gravity_x, zero + gravity_y, zero + gravity_z};
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
-        const Touch end = touch(o, x);
-        const mask touching = (end.gap < zero) | (touch(o, from).gap < zero);
+        const Touch end = touch(o, in_world(x));
+        const mask touching = (end.gap < zero) | (touch(o, in_world(from)).gap < zero);
         if (!any(touching)) { if (CHIN4) own.left_over[k] = zero; continue; }
         const real speed = dot(v, end.n), stiffness = contact_stiffness(own, scalar(o[1]));
-        real z = end.gap - dot(end.n, x - from), u = speed;
+        real z = end.gap - dot(end.n, way_between(from, x)), u = speed;
         const real back = taken_back(z, u, stiffness, w, zero, dot(a, end.n),
                                      dot(gravity, end.n), last);
         real impulse = contact_flow(z, u, stiffness, w, zero, back, substeps, last);
@@ -169,13 +177,13 @@ auto meet_obstacles = [=](Vec& x, Vec& v, Vec from, Vec a, real w, int substeps,
         if (LEDGER) losses.stuck |= touching & stuck;
         const Vec mean = scaled(along + rubbed, select(stuck, zero, zero + scalar(0.5)));
         const Vec shift = scaled(mean - along, zero + span);
-        x = x + pick(touching, scaled(end.n, z - end.gap) + shift, Vec{zero, zero, zero});
-        v = pick(touching, scaled(end.n, u) + rubbed, v);
+        add(x, pick(touching, scaled(end.n, z - end.gap) + shift, Vec{}), scalar(1));
+        replace_where(touching, v, scaled(end.n, u) + rubbed);
     }
 };
 
 // The same for symplectic Euler, before its drift: forces at x.
-auto push_by_obstacles = [=](Vec x, Vec& v, real w, const Own& own, Losses& losses) {
+auto push_by_obstacles = [=](const Place& x, Sum& v, real w, const Own& own, Losses& losses) {
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
         const Touch now = touch(o, x);
@@ -186,11 +194,12 @@ auto push_by_obstacles = [=](Vec x, Vec& v, real w, const Own& own, Losses& loss
         const Vec along = v - scaled(now.n, speed);
         const Vec rubbed = rub_surface(along, impulse, impulse, own, o);
         if (LEDGER) losses.friction = losses.friction + (along - rubbed);
-        v = pick(depth > zero, rubbed + scaled(now.n, speed + impulse), v);
+        replace_where(depth > zero, v, rubbed + scaled(now.n, speed + impulse));
     }
 };
 // A mass that sticks is reported at rest; see synchronise.
-auto hold_by_obstacles = [=](Vec x, Vec& v, real w, scalar time, const Own& own, Losses& losses) {
+auto hold_by_obstacles = [=](const Place& x, Sum& v, real w, scalar time, const Own& own,
+                             Losses& losses) {
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
         const Touch now = touch(o, x);
@@ -200,7 +209,7 @@ auto hold_by_obstacles = [=](Vec x, Vec& v, real w, scalar time, const Own& own,
         const Vec along = v - scaled(now.n, dot(v, now.n));
         const Vec rubbed = rub_surface(along, impulse, zero, own, o);
         if (LEDGER) losses.friction = losses.friction + (along - rubbed);
-        v = pick(depth > zero, v - along + rubbed, v);
+        replace_where(depth > zero, v, v - along + rubbed);
     }
 };
 """

@@ -3,24 +3,14 @@
 __all__ = ["BINDING", "OWN"]
 
 OWN = r"""
-auto dot = [=](Vec a, Vec b) __attribute__((always_inline)) -> real {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-};
-auto scaled = [=](Vec a, real s) __attribute__((always_inline)) -> Vec {
-    return Vec{a.x * s, a.y * s, a.z * s};
-};
-auto pick = [=](mask m, Vec a, Vec b) __attribute__((always_inline)) -> Vec {
-    return Vec{select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)};
-};
-
 // What a mass has of its own. A layout fills in what the features ask for; the rest is not read.
 struct Own {
     Vec outer;         // OUTER: force of pushes, tethers and collisions during the kick [N]
     Vec skin;          // SKIN: static and kinetic friction, stiffness; negative: the surface's own
-    Vec diagonal;      // BOUND: the projector P of the constraint c + P r ...
-    Vec corner;        // ... P_yz, P_xz, P_xy ...
-    Vec centre;        // ... c [m] ...
-    real radius;       // ... and the distance kept from it [m], 0 for none
+    Far diagonal;      // BOUND: the projector P of the constraint c + P r ...
+    Far corner;        // ... P_yz, P_xz, P_xy ...
+    Far centre;        // ... c [m] ...
+    wide radius;       // ... and the distance kept from it [m], 0 for none
     real* left_over;   // OBSTACLES: what each leaves over for friction, see touch_down
 };
 auto own_or = [=](real own, scalar surface) __attribute__((always_inline)) -> real {
@@ -57,57 +47,65 @@ auto outer_acceleration = [=](real z, real w, const Own& own)
 };
 """
 
-# Constraints. A mass in flight on a circle or sphere follows its great circle.
+# Constraints, in the numbers that hold a place in the world. A mass in flight on a circle or sphere
+# follows its great circle.
 BINDING = r"""
-auto project = [=](Vec r, const Own& o) __attribute__((always_inline)) -> Vec {
-    return Vec{o.diagonal.x * r.x + o.corner.z * r.y + o.corner.y * r.z,
+auto project = [=](Far r, const Own& o) __attribute__((always_inline)) -> Far {
+    return Far{o.diagonal.x * r.x + o.corner.z * r.y + o.corner.y * r.z,
                o.corner.z * r.x + o.diagonal.y * r.y + o.corner.x * r.z,
                o.corner.y * r.x + o.corner.x * r.y + o.diagonal.z * r.z};
 };
-auto is_round = [=](const Own& own) __attribute__((always_inline)) -> mask {
-    return own.radius > zero;
+auto is_round = [=](const Own& own) __attribute__((always_inline)) -> wide_mask {
+    return own.radius > wide_zero;
 };
 // The part of a velocity or an acceleration at x that the constraint allows.
-auto tangent = [=](Vec v, Vec x, const Own& own) __attribute__((always_inline)) -> Vec {
-    const Vec allowed = project(v, own), arm = project(x - own.centre, own);
-    const real length2 = dot(arm, arm);
-    const mask radial = is_round(own) & (length2 > zero);
-    const real along = dot(allowed, arm) / select(radial, length2, zero + scalar(1));
-    return allowed - scaled(arm, select(radial, along, zero));
+auto allowed_part = [=](Far v, Far x, const Own& own) __attribute__((always_inline)) -> Far {
+    const Far allowed = project(v, own), arm = project(x - own.centre, own);
+    const wide length2 = dot(arm, arm);
+    const wide_mask radial = is_round(own) & (length2 > wide_zero);
+    const wide along = dot(allowed, arm) / select(radial, length2, wide_zero + wide_scalar(1));
+    return allowed - scaled(arm, select(radial, along, wide_zero));
+};
+auto tangent = [=](Vec a, const Place& x, const Own& own) __attribute__((always_inline)) -> Vec {
+    return near_of(allowed_part(far_of(a), exact_of(x), own));
+};
+auto restrain = [=](Sum& v, const Place& x, const Own& own) __attribute__((always_inline)) {
+    v = sum_from(allowed_part(whole_of(v), exact_of(x), own));
 };
 // The point of the constraint nearest to x.
-auto nearest = [=](Vec x, const Own& own) __attribute__((always_inline)) -> Vec {
-    const Vec arm = project(x - own.centre, own);
-    const real length2 = dot(arm, arm);
-    const mask round = is_round(own) & (length2 > zero);
-    const real length = square_root(select(round, length2, zero + scalar(1)));
-    return own.centre + scaled(arm, select(round, own.radius / length, zero + scalar(1)));
+auto nearest = [=](Far x, const Own& own) __attribute__((always_inline)) -> Far {
+    const Far arm = project(x - own.centre, own);
+    const wide length2 = dot(arm, arm);
+    const wide_mask round = is_round(own) & (length2 > wide_zero);
+    const wide length = square_root(select(round, length2, wide_zero + wide_scalar(1)));
+    const wide stretch = select(round, own.radius / length, wide_zero + wide_scalar(1));
+    return own.centre + scaled(arm, stretch);
 };
 // cos(a) and sin(a) / a from a^2, to rounding up to an angle of 1: much more than a drift's.
-auto cosine_of = [=](real a2) __attribute__((always_inline)) -> real {
-    real sum = zero + scalar(1);
-    for (int k = 16; k > 0; k -= 2) sum = scalar(1) - sum * a2 * scalar(1.0 / (k * (k - 1)));
+auto cosine_of = [=](wide a2) __attribute__((always_inline)) -> wide {
+    wide sum = wide_zero + wide_scalar(1);
+    for (int k = 16; k > 0; k -= 2)
+        sum = wide_scalar(1) - sum * a2 * wide_scalar(1.0 / (k * (k - 1)));
     return sum;
 };
-auto sine_ratio_of = [=](real a2) __attribute__((always_inline)) -> real {
-    real sum = zero + scalar(1);
-    for (int k = 17; k > 1; k -= 2) sum = scalar(1) - sum * a2 * scalar(1.0 / (k * (k - 1)));
+auto sine_ratio_of = [=](wide a2) __attribute__((always_inline)) -> wide {
+    wide sum = wide_zero + wide_scalar(1);
+    for (int k = 17; k > 1; k -= 2)
+        sum = wide_scalar(1) - sum * a2 * wide_scalar(1.0 / (k * (k - 1)));
     return sum;
-};
-// A velocity put in place of another.
-auto restrain = [=](Sum& v, Vec allowed) __attribute__((always_inline)) {
-    v.x = allowed.x; v.y = allowed.y; v.z = allowed.z;
 };
 // Put what a drift from (x0, v0) made of a mass, (x, v), on its constraint.
-auto bind = [=](Vec& x, Vec& v, Vec x0, Vec v0, const Own& own) __attribute__((always_inline)) {
-    const mask round = is_round(own);
-    const Vec arm = x0 - own.centre;
-    const real r2 = select(round, own.radius * own.radius, zero + scalar(1));
-    const real rate2 = dot(v0, v0) / r2, angle2 = rate2 * (span * span);
-    const real c = cosine_of(angle2), s = sine_ratio_of(angle2) * span;
-    x = pick(round, own.centre + scaled(arm, c) + scaled(v0, s), x);
-    v = pick(round, scaled(v0, c) - scaled(arm, rate2 * s), v);
-    x = nearest(x, own);
-    v = tangent(v, x, own);
+auto bind = [=](Sum& x, Sum& v, const Sum& x0, const Sum& v0, const Own& own)
+        __attribute__((always_inline)) {
+    const wide_mask round = is_round(own);
+    const Far arm = exact_of(in_world(x0)) - own.centre, start = whole_of(v0);
+    const wide r2 = select(round, own.radius * own.radius, wide_zero + wide_scalar(1));
+    const wide rate2 = dot(start, start) / r2, angle2 = rate2 * wide_scalar(span * span);
+    const wide c = cosine_of(angle2), s = sine_ratio_of(angle2) * wide_scalar(span);
+    const Far turned = own.centre + scaled(arm, c) + scaled(start, s);
+    const Far there = nearest(pick(round, turned, exact_of(in_world(x))), own);
+    const Far moving = pick(round, scaled(start, c) - scaled(arm, rate2 * s), whole_of(v));
+    x = sum_from(from_origin(there));
+    v = sum_from(allowed_part(moving, there, own));
 };
 """

@@ -82,6 +82,10 @@ auto keep_quad = [=](scalar* where, Slot at, Vec x, real w) __attribute__((alway
 auto in_slice = [=](scalar* values, Slot at, int rows) __attribute__((always_inline)) -> real* {
     return (real*)(values + (long long)at.slice * rows * W);
 };
+auto wide_in_slice = [=](wide_scalar* values, Slot at, int rows)
+        __attribute__((always_inline)) -> wide* {
+    return (wide*)(values + (long long)at.slice * rows * W);
+};
 const int STRIDE = 1;  // from one row of a slice to the next, in numbers
 auto each_spring = [=](Slot at, const scalar* where, auto work) __attribute__((always_inline)) {
     const int* const site = model.slices.data + (long long)at.slice * SITE_COLUMNS;
@@ -114,9 +118,10 @@ auto own_quad = [=](const scalar* where, Slot at, real& w) -> Vec {
 auto keep_quad = [=](scalar* where, Slot at, Vec x, real w) {
     *(Quad*)(where + 4 * at.own) = Quad{x.x, x.y, x.z, w};
 };
-auto in_slice = [=](scalar* values, Slot at, int rows) -> real* {
+auto in_slice = [=](auto* values, Slot at, int rows) -> decltype(values) {
     return values + (long long)at.slice * rows * SLICE + at.lane;
 };
+auto wide_in_slice = in_slice;
 const int STRIDE = SLICE;
 auto neighbours_of = [=](const scalar* where, const unsigned* j) -> Vec {
     const Quad q = *(const Quad*)(where + *j);

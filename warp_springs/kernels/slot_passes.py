@@ -112,10 +112,12 @@ auto outer_force = [&](Slot at, Vec x) __attribute__((always_inline)) -> Vec {
         for (int l = 0; l < W; ++l)
             set_lane(part, l, acting_part(window[l], window[SLICE + l]));
         if (!any(part > zero)) continue;
-        const real* const o = in_slice(model.outer_values.data, Slot{row, at.lane, 0, 0, 0, 0}, 6);
-        const Vec f = {o[0], o[STRIDE], o[2 * STRIDE]};
-        const Vec pull = tether_force(f - x, o[3 * STRIDE], o[4 * STRIDE]);
-        sum = sum + scaled(pick(o[5 * STRIDE] > zero, pull, f), part);
+        const Slot here = {row, at.lane, 0, 0, 0, 0};
+        const wide* const o = wide_in_slice(model.outer_values.data, here, 6);
+        const Far given = {o[0], o[STRIDE], o[2 * STRIDE]};  // a force, or the point of a tether
+        const Vec pull = tether_force(way_from(x, given), narrow(o[3 * STRIDE]),
+                                      narrow(o[4 * STRIDE]));
+        sum = sum + scaled(pick(narrow(o[5 * STRIDE] > wide_zero), pull, near_of(given)), part);
     }
     return sum;
 };
@@ -126,10 +128,10 @@ auto own_of = [&](Slot at, Vec x, real* left_over) __attribute__((always_inline)
     if (OUTER) own.outer = outer_force(at, x);
     if (SKIN) own.skin = load(model.skins.data, at);
     if (BOUND) {
-        const real* const b = in_slice(model.bonds.data, at, 10);
-        own.diagonal = Vec{b[0], b[STRIDE], b[2 * STRIDE]};
-        own.corner = Vec{b[3 * STRIDE], b[4 * STRIDE], b[5 * STRIDE]};
-        own.centre = Vec{b[6 * STRIDE], b[7 * STRIDE], b[8 * STRIDE]};
+        const wide* const b = wide_in_slice(model.bonds.data, at, 10);
+        own.diagonal = Far{b[0], b[STRIDE], b[2 * STRIDE]};
+        own.corner = Far{b[3 * STRIDE], b[4 * STRIDE], b[5 * STRIDE]};
+        own.centre = Far{b[6 * STRIDE], b[7 * STRIDE], b[8 * STRIDE]};
         own.radius = b[9 * STRIDE];
     }
     return own;
@@ -156,8 +158,9 @@ auto trouble = [=](Slot at, const scalar* where, Vec low, Vec v)
         each_spring(at, where, [&](Vec b, real, real, real, real) __attribute__((always_inline)) {
             stretched |= is_far(b);
         });
-    bool deep = GROUND && any(in_world(sum_of(&a, &low, 0)).z < -depth_limit);
-    if (OBSTACLES) deep = any((w > zero) & (depth_in_obstacles(a) > zero + depth_limit));
+    const Place place = in_world(sum_of(&a, &low, 0));
+    bool deep = GROUND && any(place.z < -depth_limit);
+    if (OBSTACLES) deep = any((w > zero) & (depth_in_obstacles(place) > zero + depth_limit));
     return (deep ? 1 : 0) | (any(stretched) ? 2 : 0) | (any(fast) ? 4 : 0)
         | (any(poison_of(a, v) != zero) ? 8 : 0);
 };
@@ -263,7 +266,7 @@ auto rate_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, Su
     const Vec here = own_quad(now, at, w), high = shifted ? own_quad(then, at, w) : here;
     Losses losses = {};
     if (!start) {
-        const Vec place = in_world(sum_of(&high, &low, 0));
+        const Place place = in_world(sum_of(&high, &low, 0));
         lose_before(v, place, w, own_of(at, here, nullptr), losses);
     }
     keep_quad(state.rates.data, among_all(at), v, w);
@@ -273,7 +276,7 @@ auto middle_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, 
     real w;
     const Vec here = own_quad(now, at, w), high = shifted ? own_quad(then, at, w) : here;
     const Force sum = gather(at, now, here, sine, cosine, state.rates.data);
-    const Vec place = in_world(sum_of(&high, &low, 0));
+    const Place place = in_world(sum_of(&high, &low, 0));
     const Vec a = kick_acceleration(sum.f, place, w, own_of(at, here, nullptr));
     const Vec rate = own_quad(state.rates.data, among_all(at), w);
     keep_quad(state.middle_rates.data, among_all(at), rate + scaled(a, zero + time * scalar(0.5)),

@@ -59,7 +59,10 @@ auto pass = [&](int job, scalar time, bool start, bool last) {{
 
 _ORIGIN = r"""
 real origins_here[3] = {zero + origin[0][0], zero + origin[1][0], zero + origin[2][0]};
+wide far_origins_here[3] = {wide_zero + far_origin[0][0], wide_zero + far_origin[1][0],
+                            wide_zero + far_origin[2][0]};
 real* const origin = origins_here;
+wide* const far_origin = far_origins_here;
 """
 
 _JOBS = r"""
@@ -222,7 +225,7 @@ auto move_row = [&](Vec f, Vec* xs, Vec* low_xs, Vec* vs, Vec* low_vs, Vec* shif
     Sum u = sum_of(vs, low_vs, i);
     if (EULER) move_mass_euler(a, u, f, iw, 0, own);
     else {
-        const Vec at_here = job == 5 && WATER ? from_here(shifted[i], a) : in_world(a);
+        const Place at_here = job == 5 && WATER ? from_here(shifted[i], a) : in_world(a);
         real rest = CHIN4 && GROUND && last ? *left : zero;
         move_mass(a, u, f, at_here, iw, substeps, rest, time, start, last, 0, own);
         if (CHIN4 && GROUND && !last) *left = rest;
