@@ -19,12 +19,12 @@ def point(position, velocity, mass=0.1):
     )
 
 
-def plate(size=1.0):
+def plate(size=1.0, mass=1.0):
     """A fixed triangle in the plane z = 0 around the origin."""
     angles = np.array([0, 2, 4]) * np.pi / 3
     corners = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * size
     return ws.Robot(
-        masses=1.0,
+        masses=mass,
         positions=corners,
         springs=[(0, 1), (1, 2), (0, 2)],
         stiffness=1e3,
@@ -231,3 +231,97 @@ def test_a_block_on_a_tilted_block_sticks_or_slides(cube, layout):
     t = slides.times
     fit = np.linalg.lstsq(np.stack([1 + 0 * t, t, t**2 / 2], axis=1), way, rcond=None)[0]
     assert fit[2] == pytest.approx(g * (np.sin(angle) - mu_k * np.cos(angle)), rel=0.03)
+
+
+@pytest.mark.parametrize(("ratio", "layout"), [(0.05, "lanes"), (0.3, "lanes"), (0.3, "flat")])
+def test_restitution_and_duration_of_an_impact_are_those_of_a_damped_spring(ratio, layout):
+    # Schwager and Poeschel 2007: the contact ends when its force does, before the overlap is gone.
+    k, m, v, dt = 1e4, 0.1, 1.0, 2e-5
+    w0 = np.sqrt(k / m)
+    w = w0 * np.sqrt(1 - ratio**2)
+    lasts = (np.pi - np.arctan2(2 * ratio * w0 * w, w**2 - (ratio * w0) ** 2)) / w
+    keeps = np.exp(-ratio * w0 * lasts)
+    options = SMOOTH | {"damping": ratio}
+    collisions = ws.Collisions(thickness=0.01, stiffness=k, **options)
+    scene = ws.Scene(collisions=collisions, **WEIGHTLESS)
+    robots = [point((0.1, 0.05, 0.011), (0.3, 0.0, -v)), plate(mass=1e6)]
+    simulation = ws.Simulation(robots, scene, dt, world="together", layout=layout)
+    result = simulation.run(0.015, fps=1 / dt, energy=True)
+    speed = result.velocities(0)[0]
+    assert speed == pytest.approx((0.3, 0.0, keeps * v), rel=2e-3)
+    lost = 0.5 * m * v**2 * (1 - keeps**2)
+    assert result.energy.dashpot_loss[0, -1] == pytest.approx(lost, rel=2e-3)
+    height = result.frames(0)[:, 0, 2]
+    pushed = np.abs(np.diff(height, 2)) > 1e-3 * w0 * v * dt**2
+    ends = np.flatnonzero(pushed)[[0, -1]]
+    assert (ends[1] - ends[0]) * dt == pytest.approx(lasts, abs=3 * dt)
+
+
+def jaw(side, reach=0.1):
+    """A square in the plane x = side, guided along x, that a force of 1 N presses inwards."""
+    corners = [(side, y, z) for y in (-reach, reach) for z in (-reach, reach)]
+    springs = [(0, 1), (1, 3), (3, 2), (2, 0), (0, 3), (1, 2)]
+    plate = ws.Robot(
+        masses=0.05,
+        positions=corners,
+        springs=springs,
+        stiffness=1e4,
+        faces=[(0, 1, 3), (0, 3, 2)],
+    )
+    return plate.fixed(axes="yz").pushed(None, (-0.25 * np.sign(side), 0, 0))
+
+
+def test_a_jaw_that_closes_holds_what_its_friction_can_carry():
+    # Two plates with 1 N each carry 2 mu N; what is heavier slides out at g - 2 mu N / m.
+    mu, g, force = 0.5, 9.81, 1.0
+    ways = {}
+    for share in (0.8, 2.0):
+        mass = share * 2 * mu * force / g
+        held = ws.shapes.cube(edge=0.05, mass=mass, stiffness=2e3)
+        held = held.moved(-held.center_of_mass).rotated((1, 0, 0), 0.3)
+        robots = [held, jaw(-0.045), jaw(0.045)]
+        rough = ws.Collisions(
+            thickness=0.01, stiffness=1e4, static_friction=mu, kinetic_friction=mu, damping=0.3
+        )
+        weightless = ws.Scene(gravity=(0, 0, 0), ground=None, damping=20.0, collisions=rough)
+        closed = ws.Simulation(robots, weightless, dt=2e-4, world="together").run(0.4)
+        x = closed.positions(0)
+        assert np.abs(x[8:, 0]).max() < 0.037 < robots[2].positions[0, 0]  # they were 1 cm away
+        grasp = closed.robots[0].replace(positions=x)
+        scene = ws.Scene(ground=None, collisions=rough)
+        fall = ws.Simulation(grasp, scene, dt=2e-4).run(0.15, fps=100).frames(0)
+        ways[share] = (fall - fall[0])[:, :8, 2].mean(axis=1)
+    assert np.abs(ways[0.8]).max() < 1e-4
+    expected = -0.5 * (g - 2 * mu * force / mass) * 0.15**2
+    assert ways[2.0][-1] == pytest.approx(expected, rel=0.02)
+
+
+def folded_sheet(cells=4, edge=0.05):
+    """A strip, folded over in its middle: its upper half hangs 2 cm above its lower half."""
+    half = [(edge * i, 0.0) for i in range(cells, 0, -1)]
+    profile = [*half, (0.0, 0.01), *[(x + 0.3 * edge, 0.02) for x, _ in reversed(half)]]
+    positions = [(x, y, z) for x, z in profile for y in (0.0, edge)]
+    faces, springs = [], [(0, 1)]
+    for i in range(len(profile) - 1):
+        a, b, c, d = 2 * i, 2 * i + 1, 2 * i + 2, 2 * i + 3
+        faces += [(a, c, b), (b, c, d)]
+        springs += [(a, c), (b, d), (b, c), (c, d)]
+    sheet = ws.Robot(
+        masses=0.01, positions=positions, springs=springs, stiffness=500.0, faces=faces
+    )
+    return sheet.fixed(np.arange(2 * cells))
+
+
+def test_a_folded_sheet_comes_to_rest_on_itself():
+    k, thickness = 2e3, 0.01
+    fold = ws.Collisions(thickness=thickness, stiffness=k, damping=0.3)
+    scene = ws.Scene(ground=None, damping=5.0, collisions=fold)
+    result = ws.Simulation(folded_sheet(), scene, dt=2e-4).run(1.5, energy=True)
+    gap = result.positions(0)[12:, 2]
+    # Each mass presses on what is below by its weight, and is carried by one such spring or more.
+    assert gap.min() > thickness - 1.01 * 0.01 * 9.81 / k - 1e-5 and gap.max() < thickness
+    assert np.abs(result.velocities(0)[12:]).max() < 1e-3
+    total = result.energy.total[0]
+    assert total[-1] < total[0] and result.energy.residual[0, -1] < 0.02 * (total[0] - total[-1])
+    falls = ws.Simulation(folded_sheet(), ws.Scene(ground=None, damping=5.0), dt=2e-4).run(1.5)
+    assert falls.positions(0)[12:, 2].max() < 0.0  # through itself, without collisions

@@ -93,8 +93,8 @@ auto collide = [](scalar, bool) {};
 #endif
 auto move = [&](bool shifted, scalar time, bool start, bool last) {
     if (LIMITS && moving && !shifted) wear_slot(at, now(), sine, cosine);
-    find_rates(shifted, time, start);
     collide(time, true);
+    find_rates(shifted, time, start);
     if (moving)
         move_slot(at, now(), then(), low, velocity, rest, sine, cosine, shifted, time, start, last);
     flip();

@@ -414,16 +414,16 @@ kick_end = now;
 kick_begin = now - exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
 if (OUTER) gather_outer(x);
 consult_timetable(now);
-if (COLLIDING) {
-    collide(x, FIRST_KICK, step > 0, false);
-    if (step > 0 && !EULER) enter_collisions(FIRST_KICK);
-    ground += collision_energy;
-}
 if (DASHPOTS && step > 0) {
     auto rows = [&](const Vec* at, auto move) {
         for (int i = 0; i < M; ++i) move(i, row_force(at, i, sine, cosine));
     };
     find_rates(x, FIRST_KICK, EULER, rows);
+}
+if (COLLIDING) {
+    collide(x, FIRST_KICK, step > 0, false);
+    if (step > 0 && !EULER) enter_collisions(FIRST_KICK);
+    ground += collision_energy;
 }
 for (int i = 0; i < M; ++i) {
     const Vec f = row_force(x, i, sine, cosine);

@@ -116,8 +116,8 @@ auto collide = [](scalar, bool) {};
 #endif
 auto move = [&](bool shifted, scalar time, bool start, bool last) __attribute__((always_inline)) {
     if (LIMITS && !shifted) slices([&](Slot at) { wear_slot(at, now(), sine, cosine); });
-    find_rates(shifted, time, start);
     collide(time, true);
+    find_rates(shifted, time, start);
     slices([&](Slot at) __attribute__((always_inline)) {
         Vec low = low_at(at);
         Sum v = velocity_at(at);
@@ -464,14 +464,14 @@ def launches(features: GatherFeatures) -> Launches:
             continue
         number = f"const int PASS = {index};\n"
         within = number + _LAUNCHES + _WITHIN
+        if features.traits.colliding:
+            for name, (over, snippet) in COLLISION_JOBS.items():
+                steps.append((kernel(f"{name}_{job}", number + _COLLIDE + snippet), over))
         if job != "shift":
             steps += [
                 (kernel(f"{job}_{name}", within + snippet), "slots")
                 for name, snippet in damped.items()
             ]
-        if features.traits.colliding:
-            for name, (over, snippet) in COLLISION_JOBS.items():
-                steps.append((kernel(f"{name}_{job}", number + _COLLIDE + snippet), over))
         steps.append((kernel(job, within + _PASS), "slots"))
     check = [
         (kernel("find", _LAUNCHES + _FIND), "slots"),

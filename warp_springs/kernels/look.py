@@ -1,7 +1,7 @@
 """A look at a crowd, for every layout that gathers: it changes nothing.
 
 Kernels in turn: the reasons to stop a robot; the positions that are shown, good ones for a stopped
-robot; what dashpots see, where there are any; the temporary springs of collisions; what each mass
+robot; the temporary springs of collisions; what dashpots see, where there are any; what each mass
 contributes; sums over runs of slots; sums over robots. The sums are taken in float64, in an order
 that depends on the robot alone.
 """
@@ -254,11 +254,11 @@ def look(features: GatherFeatures) -> Look:
         return launch
 
     jobs = {"find": ("sites", _SITE + _FIND), "show": ("sites", _SITE + _SHOW)}
+    if features.traits.colliding:
+        jobs |= {name: (over, _COLLIDE + job) for name, (over, job) in COLLISION_JOBS.items()}
     if features.traits.dashpots and features.integrator != "euler":
         for name, snippet in {"rates": _RATES, "middle": _MIDDLE}.items():
             jobs[name] = ("sites", _SITE + _SEEN + snippet)
-    if features.traits.colliding:
-        jobs |= {name: (over, _COLLIDE + job) for name, (over, job) in COLLISION_JOBS.items()}
     jobs |= {
         "look": ("sites", _SITE + _SEEN + _LOOK),
         "add": ("chunks", _ADD),

@@ -258,7 +258,7 @@ auto wear_slot = [&](Slot at, const scalar* where, scalar sine, scalar cosine) {
     close_accounts(state.ledgers.data, at, accounts);
 };
 // What the dashpots see: velocities as a kick begins, then, by the midpoint rule, in its middle, as
-// forces at the former make them. Between the two all must have met. For `now`, `then` and
+// forces at the former make them, those of collisions too. Between the two all must have met. For `now`, `then` and
 // `shifted` see move_slot.
 auto rate_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, Sum v, bool shifted,
                      bool start) {
@@ -275,7 +275,9 @@ auto middle_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, 
                        scalar cosine, scalar time, bool shifted) {
     real w;
     const Vec here = own_quad(now, at, w), high = shifted ? own_quad(then, at, w) : here;
-    const Force sum = gather(at, now, here, sine, cosine, state.rates.data);
+    Force sum = gather(at, now, here, sine, cosine, state.rates.data);
+    Accounts none = {};
+    touches_of(at, sum, none, scalar(0), false);
     const Place place = in_world(sum_of(&high, &low, 0));
     const Vec a = kick_acceleration(sum.f, place, w, own_of(at, here, nullptr));
     const Vec rate = own_quad(state.rates.data, among_all(at), w);

@@ -60,6 +60,19 @@ UNITS = {
     "point": "m",
     "rest_length": "m",
     "box": "m",
+    "cubic": "N/m³",
+    "stretch": "m",
+    "area": "m²",
+    "times": "s",
+    "period": "s",
+    "offsets": "m",
+    "place": "m",
+    "motion": "m/s",
+    "rate": "1/s",
+    "heights": "m",
+    "lowest": "m",
+    "highest": "m",
+    "origin": "m",
 }
 """Units of the keys of a configuration."""
 FIELDS = {
