@@ -196,8 +196,8 @@ class Loop:
         return 0.5 * ends * chip.cores * chip.clock
 
 
-def spring_loop(code: list[tuple[str, str]]) -> Loop | None:
-    """The loop over springs of a kernel, or None if it has none."""
+def inner_loops(code: list[tuple[str, str]]) -> list[list[str]]:
+    """The operations of each innermost loop of a kernel."""
     labels = {name: at for at, (kind, name) in enumerate(code) if kind == "label"}
     loops = []
     for at, (operation, operands) in enumerate(code):
@@ -205,9 +205,13 @@ def spring_loop(code: list[tuple[str, str]]) -> Loop | None:
         if operation.startswith("BRA") and target and labels.get(target[0], at) < at:
             loops.append((labels[target[0]], at))
     inner = [a for a in loops if not any(a[0] <= b[0] and b[1] < a[1] for b in loops)]
+    return [[op for op, _ in code[first : last + 1] if op != "label"] for first, last in inner]
+
+
+def spring_loop(code: list[tuple[str, str]]) -> Loop | None:
+    """The loop over springs of a kernel, or None if it has none."""
     best: tuple[int, Loop] | None = None
-    for first, last in inner:
-        body = [operation for operation, _ in code[first : last + 1] if operation != "label"]
+    for body in inner_loops(code):
         roots = sum(op.startswith("MUFU.RSQ") for op in body)
         widths = [_width(op) for op in body if op.startswith("LDG")]
         if roots == 0 or max(widths, default=0) < 16 or (best and roots <= best[0]):

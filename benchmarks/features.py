@@ -1,11 +1,14 @@
 """What each element of the physics costs a step, and that a scene without any pays nothing.
 
-    python benchmarks/features.py [--layout lanes] [--base REV] [--json FILE]
+    python benchmarks/features.py [--layout lanes] [--base REV] [--bodies] [--json FILE]
 
 The robots are lattices that breathe on the ground. For each element the same robots are stepped
 with it and without, in turns in one process on one thread; the ratio is the median over the turns.
 Before a speed is printed the element is validated: it must change the motion, and another layout
 must find the same motion to rounding.
+
+``--bodies`` builds, saves, loads, writes and reads the course's worm, and simulates every
+demonstration; what comes back must be what was written.
 
 ``--base REV`` steps scenes without elements in two processes in turns: one has this tree, the other
 a git worktree of that revision, from before there were elements. (``benchmarks/collisions.py`` has
@@ -21,6 +24,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +34,7 @@ from rich.console import Console
 from rich.table import Table
 
 import warp_springs as ws
+from warp_springs import demos
 from warp_springs.bench.machine import machine
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -82,6 +87,7 @@ def elements() -> list[Element]:
     s = BODY.n_springs
     times, low = [0.0, 0.05, 0.1], BODY.bounds[0, 2]
     return [
+        Element("bone, tissue and two muscles", made),
         Element("friction and stiffness of single masses", lambda r: r.shod(kinetic_friction=0.1)),
         Element("hardening springs", lambda r: r.with_hardening(1e5)),
         Element("stiffness by a table of stretch", lambda r: r.with_curve([0.001], [1.0, 2.0])),
@@ -121,6 +127,13 @@ def elements() -> list[Element]:
         ),
         Element("a controller, 50 readings a second", lambda r: r.controlled(brain())),
     ]
+
+
+def made(robot: ws.Robot) -> ws.Robot:
+    """Of the four classic materials."""
+    for k, name in enumerate(("BONE", "TISSUE", "MUSCLE", "MUSCLE2")):
+        robot = robot.made_of(getattr(ws.materials, name), where=np.arange(k, BODY.n_springs, 4))
+    return robot
 
 
 def square() -> ws.Waveform:
@@ -205,6 +218,33 @@ def measure(element: Element, layout: str, count: int) -> dict:
     }
 
 
+def handle_bodies() -> list[dict]:
+    """Seconds to make the worm, to take it through files, and to simulate the demonstrations."""
+    rows = []
+
+    def timed(what: str, work: Callable):
+        started = time.perf_counter()
+        found = work()
+        rows.append({"element": what, "seconds": time.perf_counter() - started})
+        return found
+
+    config = demos.load("worm").robot.body
+    worm = timed("the course's worm: a lattice of 270,033 bars", config.build)
+    with tempfile.TemporaryDirectory() as folder:
+        saved, mesh = Path(folder) / "worm.npz", Path(folder) / "worm.vtu"
+        timed("Robot.save", lambda: worm.save(saved))
+        same = timed("Robot.load", lambda: ws.Robot.load(saved)) == worm
+        timed("write_mesh, .vtu", lambda: ws.write_mesh(worm, mesh))
+        read = timed("read_mesh, .vtu", lambda: ws.read_mesh(mesh))
+    if not (same and read.n_springs == worm.n_springs == 270_033):
+        sys.exit("a worm did not survive a file")
+    for name in demos.NAMES:
+        result = timed(f"demonstration: {name}", demos.load(name).run)
+        if result.status.any():
+            sys.exit(f"{name}: {result.status}")
+    return rows
+
+
 # What both revisions can run, as the text of a program: a line in, seconds out.
 WORKER = """
 import sys
@@ -217,11 +257,11 @@ large = ws.shapes.lattice(10, 10, 10).moved((0.0, 0.0, 0.001))
 walk = ws.Scene(ground=ws.Ground(static_friction=0.6, kinetic_friction=0.4), damping=0.5)
 free = ws.Scene(ground=None)
 cases = {
-    "free flight, float64": ([body] * 512, free, "float64", 1000),
-    "walking, float64": ([moving] * 512, walk, "float64", 600),
-    "walking, float32": ([moving] * 512, walk, "float32", 1000),
-    "one robot alone, float64": ([moving], walk, "float64", 40000),
-    "a large body, flat, float64": ([large], walk, "float64", 3000),
+    "free flight, float64": ([body] * 512, free, "float64", 300),
+    "walking, float64": ([moving] * 512, walk, "float64", 200),
+    "walking, float32": ([moving] * 512, walk, "float32", 300),
+    "one robot alone, float64": ([moving], walk, "float64", 12000),
+    "a large body, flat, float64": ([large], walk, "float64", 500),
 }
 ready = {}
 print(ws.__file__, flush=True)
@@ -274,7 +314,7 @@ class Side:
         self._process.communicate()
 
 
-def compare(revision: str, turns: int = 15) -> list[dict]:
+def compare(revision: str, turns: int) -> list[dict]:
     """Seconds of the scenes here and at the base, in turns; the ratio is that of the best."""
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "base"
@@ -316,14 +356,19 @@ def main() -> None:
     parser.add_argument("--layout", choices=("lanes", "flat", "block"), default="lanes")
     parser.add_argument("--robots", type=int, help="128 in the lanes, else 4")
     parser.add_argument("--base", metavar="REV", help="compare scenes without elements with this")
+    parser.add_argument("--turns", type=int, default=45, help="of a comparison with a revision")
+    parser.add_argument("--bodies", action="store_true", help="bodies, files and demonstrations")
     parser.add_argument("--json", type=Path, help="write all figures to this file as well")
     options = parser.parse_args()
     count = options.robots or (128 if options.layout == "lanes" else 4)
     console = Console()
     report = {"machine": machine("cpu"), "layout": options.layout, "robots": count}
     if options.base:
-        report["base"] = {"revision": options.base, "rows": compare(options.base)}
+        report["base"] = {"revision": options.base, "rows": compare(options.base, options.turns)}
         console.print(table(f"without elements, against {options.base}", report["base"]["rows"]))
+    elif options.bodies:
+        report["bodies"] = handle_bodies()
+        console.print(table("bodies, files and demonstrations", report["bodies"]))
     else:
         rows = []
         for element in elements():

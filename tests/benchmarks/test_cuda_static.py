@@ -46,14 +46,26 @@ SPECIAL = Traits(
 
 
 @pytest.mark.parametrize(
-    ("layout", "precision"), [("block", "float32"), ("block", "float64"), ("flat", "mixed")]
+    ("layout", "precision", "size", "bytes_spilled"),
+    [
+        ("block", "float32", 256, 0),
+        ("block", "float64", 256, 0),
+        ("block", "mixed", 384, 80),  # the largest, with fewer registers for a thread
+        ("flat", "mixed", 256, 0),
+    ],
 )
-def test_elements_of_every_kind_compile(layout, precision, tmp_path):
+def test_all_elements_at_once_spill_nothing_that_a_spring_needs(
+    layout, precision, size, bytes_spilled, tmp_path
+):
     about = replace(cuda_static.features(layout, precision, "walking", ledger=True), traits=SPECIAL)
-    path = cuda_static.compiled(about, 90, BLOCK_SIZES[precision][-1], tmp_path)
-    used = cuda_static.resources(path)
+    path = cuda_static.compiled(about, 90, size, tmp_path)
+    used, code = cuda_static.resources(path), cuda_static.instructions(path)
     steps = {"advance"} if layout == "block" else {"kick_rates", "last_kick_middle", "find"}
     assert steps <= used.keys()
+    assert max(row["spilled"] for row in used.values()) <= bytes_spilled
+    loops = [loop for kernel in code.values() for loop in cuda_static.inner_loops(kernel)]
+    assert any(op.startswith("MUFU.RSQ") for loop in loops for op in loop)
+    assert not any(op.startswith(("LDL", "STL")) for loop in loops for op in loop)
 
 
 @pytest.mark.parametrize("layout", ["block", "flat"])

@@ -98,6 +98,10 @@ def check_agreement(robots, scene, world="apart"):
     lanes = run(robots, scene, "lanes", world=world)
     others = [run(robots, scene, layout, world=world) for layout in ("flat", "block")]
     close = run(robots, scene, "lanes", "mixed", world=world)
+    # What hangs on the last bit, as where a mass lies on the very edge of a box, none can tell.
+    rng = np.random.default_rng(1)
+    shaken = [r.moved(rng.normal(size=3) * 1e-8) for r in robots]
+    shaken = run(shaken, scene, "lanes", world=world)
     for i, healthy in enumerate(lanes.status == ws.Status.OK):
         for result in (lanes, *others, close):
             assert np.isfinite(result.frames(i)).all() and np.isfinite(result.velocities(i)).all()
@@ -105,13 +109,12 @@ def check_agreement(robots, scene, world="apart"):
             assert result.status[i] == lanes.status[i]
             assert np.array_equal(result.broken(i), lanes.broken(i), equal_nan=True)
             assert np.abs(result.frames(i) - lanes.frames(i)).max() < 1e-9
+            assert np.abs(result.velocities(i) - lanes.velocities(i)).max() < 1e-6
             assert np.abs(result.signals(i) - lanes.signals(i)).max() < 1e-6
             residual = result.energy.residual[i] - lanes.energy.residual[i]
             assert not healthy or np.abs(residual).max() < 1e-7
-        # Whether a spring breaks, or a sensor touches, may hang on the last bit of a float32.
-        alike = np.array_equal(np.isnan(close.broken(i)), np.isnan(lanes.broken(i)))
-        if healthy and alike and np.abs(close.signals(i) - lanes.signals(i)).max() < 1e-2:
-            assert np.abs(close.frames(i) - lanes.frames(i)).max() < 1e-3
+        if healthy and np.abs(shaken.frames(i) - lanes.frames(i)).max() < 1e-6:
+            assert np.abs(close.frames(i) - lanes.frames(i)).max() < 1e-4
 
 
 EXAMPLES = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow])

@@ -258,8 +258,8 @@ auto wear_slot = [&](Slot at, const scalar* where, scalar sine, scalar cosine) {
     close_accounts(state.ledgers.data, at, accounts);
 };
 // What the dashpots see: velocities as a kick begins, then, by the midpoint rule, in its middle, as
-// forces at the former make them, those of collisions too. Between the two all must have met. For `now`, `then` and
-// `shifted` see move_slot.
+// forces at the former make them, those of collisions too. Between the two all must have met. For
+// `now`, `then` and `shifted` see move_slot.
 auto rate_slot = [&](Slot at, const scalar* now, const scalar* then, Vec low, Sum v, bool shifted,
                      bool start) {
     real w;
