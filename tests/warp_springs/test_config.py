@@ -234,6 +234,8 @@ sensors = [
 springs = [7]
 hidden = 0
 weights = [0.25, -0.5, 1.0]
+response = 0.1
+growth = {speed = 0.3, budget = 0.5}
 sensors = [{type = "clock", period = 1.0}]
 
 [simulation]
@@ -264,7 +266,8 @@ def test_closed_loops(scene):
         rate=50.0,
     )
     first = first.replace(weights=0.5 * np.random.default_rng(3).normal(size=first.n_weights))
-    second = ws.Controller([s.clock(1.0)], [7], [0.25, -0.5, 1.0], hidden=0)
+    second = ws.Controller([s.clock(1.0)], [7], [0.25, -0.5, 1.0], hidden=0, response=0.1)
+    second = second.replace(growth=ws.Growth(speed=0.3, budget=0.5))
     expected = ws.shapes.cube().controlled(first).controlled(second)
     expected = expected.rotated((0, 0, 1), 1.0).moved((0, 0, 0.01))
     assert robot == expected

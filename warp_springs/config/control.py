@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from warp_springs import sensors
-from warp_springs.body.control import Controller
+from warp_springs.body.control import Controller, Growth
 from warp_springs.config.chosen import Masses, Springs
 from warp_springs.config.section import Section, Triple, one_of
 from warp_springs.robot import Robot
@@ -125,6 +125,21 @@ class Clock(Section):
 AnySensor = one_of((Contact, Force, Length, Velocity, Tilt, Goal, Light, Clock), "type")
 
 
+class GrowthConfig(Section):
+    """Outputs as the speed of a growth that is never undone."""
+
+    speed: float = Field(0.5, gt=0.0)
+    """Growth at an output of 1 [1/s]."""
+    limit: float = Field(1.0, gt=0.0)
+    """Largest growth of one output."""
+    budget: float | None = Field(None, ge=0.0)
+    """Largest sum of the growths of all outputs; any when left out."""
+
+    def growth(self) -> Growth:
+        """The growth itself."""
+        return Growth(**self.model_dump(exclude_none=True))
+
+
 class ControllerConfig(Springs):
     """A closed loop: sensors, a network, and the springs it drives; several drive different ones.
 
@@ -133,8 +148,8 @@ class ControllerConfig(Springs):
 
     sensors: tuple[AnySensor, ...] = Field(min_length=1)
     """What it reads, in this order."""
-    outputs: tuple[int, ...] | None = None
-    """Which output each of its springs obeys; one for each when left out."""
+    outputs: tuple[int, ...] | tuple[tuple[int, int], ...] | None = None
+    """Which output each of its springs obeys, or which two; one for each when left out."""
     hidden: int = Field(8, ge=0)
     """Hidden neurons."""
     recurrent: bool = False
@@ -146,10 +161,14 @@ class ControllerConfig(Springs):
     """Standard deviation of random weights."""
     seed: int = Field(0, ge=0)
     """From which random weights follow."""
-    reach: float = Field(0.2, gt=0.0, lt=1.0)
-    """Largest change of a rest length, as a part of it."""
+    reach: float | tuple[float, ...] = 0.2
+    """Largest change of a rest length, as a part of it, of all springs or of each."""
     rate: float = Field(20.0, gt=0.0)
     """Readings a second [1/s]."""
+    response: float = Field(0.0, ge=0.0)
+    """Time in which muscles come to 63 % of a new output [s]."""
+    growth: GrowthConfig | None = None
+    """Instead of changes that come and go."""
 
     def applied(self, robot: Robot) -> Robot:
         """The robot with this closed loop."""
@@ -161,6 +180,8 @@ class ControllerConfig(Springs):
             recurrent=self.recurrent,
             reach=self.reach,
             rate=self.rate,
+            response=self.response,
+            growth=self.growth and self.growth.growth(),
         )
         weights = self.weights
         if weights is None:
