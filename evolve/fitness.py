@@ -212,13 +212,13 @@ def approach(trial: Trial) -> np.ndarray:
     return gap[:, 0] - gap[:, -1]
 
 
-@measure("", path=True, goal=True)
+@measure("of the lamp's light", path=True, goal=True)
 def brightness(trial: Trial) -> np.ndarray:
     """Mean level of the light of a lamp above the goal: 1 under it, one half a metre away."""
     return (1.0 / (1.0 + trial.gap**2)).mean(axis=1)
 
 
-@measure("", goal=True)
+@measure("of the lamp's light", goal=True)
 def light(trial: Trial) -> np.ndarray:
     """Level of the light of a lamp at the goal on the brightest mass at the end: 1 at the lamp.
 

@@ -37,6 +37,10 @@ class GrowthSettingsBase(PacedSettings, CellSettings):
     """Cells up to which a body grows even if its rule wants no more."""
     hidden: int = Field(6, ge=1, le=64)
     """Hidden neurons of the rule."""
+    mutation_rate: float = Field(0.04, gt=0.0, le=1.0)
+    """Share of the weights that a mutation changes, on average: each is felt in all cells."""
+    mutation_step: float = Field(0.1, gt=0.0)
+    """Standard deviation of a mutation, as a share of a gene's range."""
 
 
 class GrowthSettings(GrowthSettingsBase):

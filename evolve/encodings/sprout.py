@@ -43,12 +43,14 @@ class SproutSettings(GrowthSettingsBase):
     """Share of the mass that is the pot: the base of the first cell, which stands on the ground."""
     material: float = Field(7.0, gt=0.0)
     """How many cells it suffices for: of buds that are more, only some grow."""
-    bud: float = Field(0.25, gt=0.05, lt=1.0)
-    """Size of a bud, as a part of the cell that it becomes."""
+    bud: float = Field(0.4, gt=0.05, lt=1.0)
+    """Size of a bud, as a part of the cell that it becomes; smaller ones may be squashed."""
     speed: float = Field(0.5, gt=0.0)
     """How much of a cell may grow in a second, at most [1/s]."""
     rate: float = Field(20.0, gt=0.0)
     """Readings of the light a second [1/s]."""
+    response: float = Field(0.1, ge=0.0)
+    """Time in which rest lengths come to 63 % of what has grown [s]: springs do not jump."""
     far: float = Field(1.0, gt=0.0)
     """Distance at which the light is half as bright [m]."""
     stiffness: Interval = (100.0, 1000.0)
@@ -66,7 +68,7 @@ class SproutEncoding(GrowingBody):
     """A rule of growth, and four genes by which the light lets the corners of its cells grow.
 
     The rule makes a plan, heading up, by a lamp overhead. The robot begins as a seedling: its heavy
-    pot stands on the ground, everything else is a bud of a quarter of its size, at rest. Twenty
+    pot stands on the ground, everything else is a bud of 0.4 of its size, at rest. Twenty
     times a second each corner reads the light at its place, and grows by
 
         tanh(level light + contrast (light - that of its cell) + patience (size of the cell that its
@@ -132,6 +134,7 @@ class SproutEncoding(GrowingBody):
             weights=_weights(cells, genome[-self.own_genes :]).ravel(),
             hidden=0,
             rate=settings.rate,
+            response=settings.response,
             growth=ws.Growth(settings.speed, LIMIT, budget=4.0 * settings.material),
         )
 

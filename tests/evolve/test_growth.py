@@ -129,16 +129,16 @@ SCENE = ws.Scene(damping=4.0)
 def test_a_seedling_is_at_rest_and_becomes_what_was_planned(monkeypatch):
     seedling = sprout(genes(readiness=3.0), monkeypatch, material=20.0)
     np.testing.assert_allclose(seedling.rest_length, seedling.lengths)
-    assert np.ptp(seedling.positions[:, 2]) == pytest.approx(0.25 * 0.4)
+    assert np.ptp(seedling.positions[:, 2]) == pytest.approx(0.4 * 0.4)
     assert seedling.mass == pytest.approx(10.0)
     assert seedling.masses[:4].sum() > 9.0
     weightless = ws.Scene(gravity=(0, 0, 0), ground=None, damping=8.0)
     end = ws.Simulation([seedling], weightless, dt=1e-3).run(6.0)
     np.testing.assert_allclose(end.signals(0), LIMIT, atol=1e-9)
     upper = (seedling.springs >= 4).all(axis=1)
-    # Every spring above the pot is 0.25 + 1.2 (1 - 0.25) of what was planned, and at rest.
-    full = seedling.rest_length[upper] / 0.25
-    wanted = full * (0.25 + 0.75 * LIMIT)
+    # Every spring above the pot is 0.4 + 1.2 (1 - 0.4) of what was planned, and at rest.
+    full = seedling.rest_length[upper] / 0.4
+    wanted = full * (0.4 + 0.6 * LIMIT)
     np.testing.assert_allclose(end.rest_lengths(0)[upper], wanted, rtol=1e-6)
     i, j = seedling.springs[upper].T
     x = end.positions(0)
