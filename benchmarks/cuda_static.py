@@ -44,7 +44,7 @@ import warp as wp
 from warp_springs.engine.layouts import BLOCK_SIZES
 from warp_springs.kernels.block import block
 from warp_springs.kernels.buffers import real_dtype
-from warp_springs.kernels.flat import launches
+from warp_springs.kernels.flat_launches import launches
 from warp_springs.kernels.gather import SLICE, GatherFeatures
 
 

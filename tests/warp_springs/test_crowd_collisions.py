@@ -11,7 +11,7 @@ import warp_springs as ws
 from warp_springs.engine import crowd
 from warp_springs.kernels import crowd_collisions
 from warp_springs.kernels.block import block
-from warp_springs.kernels.flat import launches
+from warp_springs.kernels.flat_launches import launches
 from warp_springs.kernels.gather import SLICE, GatherFeatures
 from warp_springs.kernels.traits import Traits
 

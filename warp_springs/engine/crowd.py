@@ -32,9 +32,10 @@ from warp_springs.engine.layouts import block_size
 from warp_springs.engine.packing import aligned
 from warp_springs.kernels.block import BLOCK, block
 from warp_springs.kernels.buffers import BUNDLE, SEEN, real_dtype, structs
-from warp_springs.kernels.bundle import CHECK_EVERY
 from warp_springs.kernels.crowd_collisions import FEATURE
-from warp_springs.kernels.flat import launches, threads
+from warp_springs.kernels.features import CHECK_EVERY
+from warp_springs.kernels.flat_launches import launches
+from warp_springs.kernels.flat_threads import threads
 from warp_springs.kernels.gather import (
     CHUNK,
     LOOKS,

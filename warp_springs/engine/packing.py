@@ -167,7 +167,7 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
 
 
 def row_pairs(row: np.ndarray, partner: np.ndarray) -> np.ndarray:
-    """How two rows at a time share their partners: what ``kernels.bundle`` steps through.
+    """How two rows at a time share their partners: what ``kernels.lanes`` steps through.
 
     For the masses 0 and 1, 2 and 3, ... of one topology: a number of runs, and for each run how
     many springs of the first mass alone, of both masses to the same partners, and of the second

@@ -12,8 +12,8 @@ import functools
 import warp as wp
 
 from warp_springs.kernels.buffers import real_type
-from warp_springs.kernels.bundle import STEPS
 from warp_springs.kernels.gather import GatherFeatures, gather_structs, passes, run_type
+from warp_springs.kernels.steps import STEPS
 
 __all__ = ["BLOCK", "block"]
 

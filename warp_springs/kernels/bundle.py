@@ -4,75 +4,15 @@ C++ text for W robots of one topology in the lanes; ``kernels.lanes`` puts it to
 passes that step them.
 """
 
-from dataclasses import astuple, dataclass, replace
-
-from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES
+from warp_springs.kernels.buffers import BUNDLE
 from warp_springs.kernels.collisions import COLLIDING
 from warp_springs.kernels.dialect import vector_dialect
 from warp_springs.kernels.element_text import OWN_OF, RATES
+from warp_springs.kernels.features import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.law import CONSTANTS, LAW
-from warp_springs.kernels.obstacles import RECORD
 from warp_springs.kernels.springs import KEEPING, WEAR
-from warp_springs.kernels.traits import PLAIN, Traits
 
-__all__ = ["CHECK_EVERY", "CONTROL", "OBSERVE", "STEPS", "Features", "feature_flags", "preamble"]
-
-#: Health is checked, and the oscillators are set anew, every so many steps, counted from the start
-#: of the simulation.
-CHECK_EVERY = 64
-
-
-@dataclass(frozen=True)
-class Features:
-    """What a kernel is compiled for; everything else is left out of it."""
-
-    precision: str
-    width: int
-    actuated: bool
-    ground: bool
-    friction: str  # "none", "coulomb", "course"
-    damping: bool
-    drag: bool
-    integrator: str
-    wind: bool = False
-    water: bool = False
-    obstacles: int = 0  # how many, the ground among them
-    traits: Traits = PLAIN
-    ledger: bool = False  # whether energies are asked for
-
-    @property
-    def name(self) -> str:
-        """A name for the module, with everything the code depends on."""
-        values = [*astuple(replace(self, traits=None)), self.traits.name]
-        return "warp_springs_lanes_" + "_".join(str(value).lower() for value in values)
-
-
-def feature_flags(features: Features) -> str:
-    """C++ text: the features as compile-time constants."""
-    flags = {
-        "ACTUATED": features.actuated,
-        "GROUND": features.ground,
-        "COULOMB": features.friction == "coulomb",
-        "COURSE": features.friction == "course",
-        "DAMPING": features.damping,
-        "DRAG": features.drag,
-        "EULER": features.integrator == "euler",
-        "CHIN4": features.integrator == "chin4",
-        "LEDGER": features.ledger,
-        "WIND": features.wind,
-        "WATER": features.water,
-    }
-    numbers = {
-        "OBSTACLES": features.obstacles,
-        "RECORD": RECORD,
-        "ACCOUNTS": len(ACCOUNTS),
-        "ENERGIES": ENERGIES,
-    }
-    lines = [f"const bool {name} = {str(on).lower()};" for name, on in flags.items()]
-    lines += [f"const int {name} = {value};" for name, value in numbers.items()]
-    lines += [features.traits.flags]
-    lines += ["double kick_begin = 0, kick_end = 0;  // the time that a kick stands for"]
-    return "\n".join(lines) + "\n"
+__all__ = ["CONTROL", "OBSERVE", "preamble"]
 
 
 def preamble(features: Features) -> str:
@@ -326,49 +266,6 @@ auto turn_oscillators = [&]() __attribute__((always_inline)) {
 };
 """
 )
-
-# The steps, in terms of a layout's passes.
-STEPS = r"""
-const long long past = (long long)last_step * division_;
-prepare();
-begin();
-bool gone = all_stopped();  // nobody is left to step
-for (long long n = (long long)first_step * division_; n < past; ++n) {
-    if (n % CHECK_EVERY == 0) {
-        end();
-        check(n);
-        begin();
-        gone = all_stopped();
-        if (ACTUATED) set_oscillators(n);
-    }
-    if (gone) {
-        turn_oscillators();
-        if (CHIN4) turn_oscillators();
-        continue;
-    }
-    const bool start = n == 0;
-    const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
-    const double now = double(n) * exact_dt, part = exact_dt * (CHIN4 ? 1.0 / 6.0 : 0.5);
-    kick_begin = EULER || start ? now : now - part;
-    kick_end = EULER ? now + exact_dt : now + part;
-    begin_step(now);
-    if (EULER) euler();
-    else kick_and_drift(false, time, start, !CHIN4);
-    if (LEDGER) enter_work(time);
-    turn_oscillators();
-    if (CHIN4) {
-        kick_begin = kick_end;
-        kick_end = now + exact_dt - part;
-        middle_of_step(now + 0.5 * exact_dt);
-        gradient_shift();
-        if (LEDGER) enter_work(GRADIENT_KICK);
-        kick_and_drift(true, GRADIENT_KICK, false, true);
-        power = zero;
-        turn_oscillators();
-    }
-}
-end();
-"""
 
 OBSERVE = r"""
 wide* const seen_x = (wide*)(seen.seen_positions.data + state_);

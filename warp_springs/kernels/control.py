@@ -14,8 +14,8 @@ import numpy as np
 import warp as wp
 
 from warp_springs.kernels.buffers import array_struct, real_dtype, real_type, wide_dtype
-from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.dialect import scalar_dialect
+from warp_springs.kernels.features import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.law import CONSTANTS, LAW
 from warp_springs.sensors import KINDS
 

@@ -11,7 +11,21 @@ import warp as wp
 
 from warp_springs.kernels.buffers import real_dtype, wide_dtype
 
-__all__ = ["native_width", "quad_operations", "scalar_dialect", "vector_dialect"]
+__all__ = [
+    "PROCESSOR_OPTIONS",
+    "native_width",
+    "quad_operations",
+    "scalar_dialect",
+    "vector_dialect",
+]
+
+
+#: How a module of kernels for this processor is compiled.
+PROCESSOR_OPTIONS = {
+    "enable_backward": False,
+    "optimization_level": 3,
+    "cpu_compiler_flags": "-march=native -mprefer-vector-width=512",
+}
 
 
 @wp.func_native("""

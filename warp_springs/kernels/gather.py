@@ -34,13 +34,13 @@ from warp_springs.kernels.buffers import (
     struct_of,
     wide_dtype,
 )
-from warp_springs.kernels.bundle import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.crowd_collisions import CROWD_COLLIDING, NO_CROWD_COLLIDING
 from warp_springs.kernels.dialect import (
     native_width,
     scalar_dialect,
     vector_dialect,
 )
+from warp_springs.kernels.features import CHECK_EVERY, Features, feature_flags
 from warp_springs.kernels.law import CONSTANTS, LAW
 from warp_springs.kernels.slot_loads import ENDS, SCALAR_LOADS, SLOT, vector_loads
 from warp_springs.kernels.slot_passes import SLOT_PASSES

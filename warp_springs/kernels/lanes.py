@@ -20,17 +20,14 @@ from typing import NamedTuple
 import warp as wp
 
 from warp_springs.kernels.buffers import real_type, structs
-from warp_springs.kernels.bundle import CONTROL, OBSERVE, STEPS, Features, preamble
+from warp_springs.kernels.bundle import CONTROL, OBSERVE, preamble
+from warp_springs.kernels.dialect import PROCESSOR_OPTIONS
+from warp_springs.kernels.features import Features
+from warp_springs.kernels.steps import STEPS
 from warp_springs.kernels.strands import strand_passes, strand_scratch
 from warp_springs.kernels.traits import PLAIN
 
 __all__ = ["Features", "Kernels", "kernels", "scratch_size"]
-
-COMPILER_OPTIONS = {
-    "enable_backward": False,
-    "optimization_level": 3,
-    "cpu_compiler_flags": "-march=native -mprefer-vector-width=512",
-}
 
 
 def scratch_size(features: Features, masses: int, springs: int) -> int:
@@ -167,7 +164,7 @@ def kernels(features: Features) -> Kernels:
     common = preamble(features)
     # A named module of its own: compiling one specialisation leaves the others alone.
     module = wp.get_module(features.name)
-    wp.set_module_options(COMPILER_OPTIONS, module)
+    wp.set_module_options(PROCESSOR_OPTIONS, module)
 
     # The ledger adds up in the order of the lanes; it is rarely asked for.
     strand = features.width == 1 and not features.ledger and features.traits == PLAIN

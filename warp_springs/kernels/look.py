@@ -13,7 +13,7 @@ import warp as wp
 
 from warp_springs.kernels.buffers import real_type, structs
 from warp_springs.kernels.crowd_collisions import COLLISION_JOBS
-from warp_springs.kernels.flat import CPU_OPTIONS
+from warp_springs.kernels.dialect import PROCESSOR_OPTIONS
 from warp_springs.kernels.gather import LOOKS, GatherFeatures, gather_structs, passes, run_type
 
 __all__ = ["Look", "look"]
@@ -194,7 +194,7 @@ def look(features: GatherFeatures) -> Look:
     Run, Seen = run_type(features.precision), structs(features.precision).seen
     real = real_type(features.precision)
     module = wp.get_module(features.name + "_look")
-    options = CPU_OPTIONS if features.vector else {"enable_backward": False}
+    options = PROCESSOR_OPTIONS if features.vector else {"enable_backward": False}
     wp.set_module_options(options, module)
     text = passes(features) + f"const int LOOKS = {LOOKS};\n"
 

@@ -2,7 +2,7 @@
 
 from warp_springs.kernels.dialect import quad_operations
 
-__all__ = ["ENDS", "SCALAR_LOADS", "SLOT", "vector_loads"]
+__all__ = ["ENDS", "KEPT", "SCALAR_LOADS", "SLOT", "vector_loads"]
 
 # Where a thread works: one slot of a slice, or, where the slots are lanes, all of them (lane 0).
 # `own` is its place in the buffers of positions, and `base` that of its robot's first slot; `root`
@@ -153,5 +153,19 @@ auto each_spring = [=](Slot at, const scalar* where, auto work) {
         j += SLICE * TOGETHER;
         c += SLICE * TOGETHER * columns;
     }
+};
+"""
+
+# Where the flat layouts keep what a mass is besides its position.
+KEPT = r"""
+auto low_at = [=](Slot at) -> Vec {
+    return MIXED ? load(state.low_positions.data, at) : Vec{};
+};
+auto velocity_at = [=](Slot at) -> Sum {
+    return load_sum(state.velocities.data, state.low_velocities.data, at);
+};
+auto keep = [=](Slot at, Vec low, const Sum& v) {
+    if (MIXED) store(state.low_positions.data, at, low);
+    store_sum(state.velocities.data, state.low_velocities.data, at, v);
 };
 """
