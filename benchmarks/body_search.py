@@ -62,7 +62,7 @@ SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     ),
     "creature from walker": (
         "creature",
-        GENETIC | WALKER | {"encoding.body_rate": 0.15, "encoding.first_changes": 4},
+        GENETIC | WALKER | {"encoding.body_rate": 0.1, "encoding.first_changes": 2},
     ),
     "creature": ("creature", GENETIC),
     "critter": ("critter", GENETIC),

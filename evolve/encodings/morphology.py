@@ -94,15 +94,15 @@ class MorphologyEncoding(EvolvingBody, ListGenomes):
     def cross(self, a: Sequence[Plan], b: Sequence[Plan], rng: np.random.Generator) -> list[Plan]:
         """Join what lies on one side of a plane of a[i] to what lies on the other of b[i].
 
-        Bodies of the same springs exchange the genes of springs instead.
+        As often as the body rate says; otherwise, and where both have the same springs, those of
+        a[i] on one side of a plane take the genes of springs in the same place of b[i].
         """
         return [self._crossed(*pair, rng) for pair in zip(a, b, strict=True)]
 
     def _crossed(self, one: Plan, other: Plan, rng: np.random.Generator) -> Plan:
-        if np.array_equal(one.springs, other.springs):
-            coins = rng.random((one.n_springs, 1)) < 0.5
-            genes = np.where(coins, one.genes, other.genes)
-            return Plan(one.positions, one.shares, one.springs, genes, one.faces)
+        same = np.array_equal(one.springs, other.springs)
+        if same or rng.random() >= self.settings.body_rate:
+            return _taught(one, other, same, rng)
         return varied(one, (lambda plan, r: crossed(plan, other, r),), self._fits, rng, 4)
 
     def express(self, genomes: Sequence[Plan]) -> list[ws.Robot]:
@@ -168,10 +168,30 @@ def _apart(one: Plan, other: Plan) -> float:
     return shape + (1.0 - shape) * min(float(2.0 * gap.mean()), 1.0)
 
 
+def _taught(one: Plan, other: Plan, same: bool, rng: np.random.Generator) -> Plan:
+    """A plan whose springs on one side of a plane do what those of another do in their place."""
+    middles = one.positions[one.springs].mean(axis=1)
+    along = middles @ rng.standard_normal(3)
+    beyond = along > along[rng.integers(len(along))]
+    theirs = np.arange(one.n_springs)
+    if not same:
+        size = max(one.extent, other.extent, 1e-9)
+        keys, places, others = _cells(one, size), *np.unique(_cells(other, size), return_index=True)
+        found = np.minimum(np.searchsorted(places, keys), len(places) - 1)
+        beyond &= places[found] == keys
+        theirs = others[found]
+    genes = np.where(beyond[:, None], other.genes[theirs], one.genes)
+    return Plan(one.positions, one.shares, one.springs, genes, one.faces)
+
+
 def _keyed(plan: Plan, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Where springs are, on a grid of a tenth of the size, as different numbers; their genes."""
+    code, first = np.unique(_cells(plan, size), return_index=True)
+    return code, plan.genes[first].astype(np.float64)
+
+
+def _cells(plan: Plan, size: float) -> np.ndarray:
+    """Numbers of the cells of that grid in which the middles of springs are, shape (S,)."""
     places = plan.positions - [*plan.positions[:, :2].mean(axis=0), plan.positions[:, 2].min()]
     middles = np.floor(places[plan.springs].mean(axis=1) / (0.1 * size)).astype(np.int64) + 512
-    code = (middles[:, 0] * 1024 + middles[:, 1]) * 1024 + middles[:, 2]
-    code, first = np.unique(code, return_index=True)
-    return code, plan.genes[first].astype(np.float64)
+    return (middles[:, 0] * 1024 + middles[:, 1]) * 1024 + middles[:, 2]
