@@ -50,6 +50,7 @@ WALKER = {
     "encoding.most_masses": 64,
     "encoding.most_springs": 400,
 }
+CUBE = {"body": {"shape": "cube"}, "encoding.most_masses": 24, "encoding.most_springs": 120}
 
 SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "walker, harmonics": ("walker", GENETIC | HARMONICS),
@@ -59,6 +60,14 @@ SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "walker, operators": (
         "creature",
         GENETIC | WALKER | {"encoding.body_rate": 0.0, "encoding.first_changes": 0},
+    ),
+    "cube, operators": (
+        "creature",
+        GENETIC | CUBE | {"encoding.body_rate": 0.0, "encoding.first_changes": 0},
+    ),
+    "creature from cube": (
+        "creature",
+        GENETIC | CUBE | {"encoding.body_rate": 0.1, "encoding.first_changes": 2},
     ),
     "creature from walker": (
         "creature",
@@ -72,8 +81,8 @@ SEARCHES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
         {"optimizer": {"type": "learning", "bodies": {"type": "genetic"}}},
     ),
 }
-"""Name -> preset, and what differs from it. "walker, operators" has the genes and the operators of
-"creature from walker", but its body stays as it is."""
+"""Name -> preset, and what differs from it. "walker, operators" and "cube, operators" have the
+genes and operators of "creature from walker" and "... cube", but their bodies stay as they are."""
 
 
 def runs_of(name: str, options: argparse.Namespace) -> list[Run]:
@@ -81,15 +90,18 @@ def runs_of(name: str, options: argparse.Namespace) -> list[Run]:
     folder = options.out / name.replace(", ", "-").replace(" ", "-")
     if folder.exists():
         runs = open_all(folder)
+        for run in runs:
+            run.change(generations=options.generations)
     else:
         preset, changes = SEARCHES[name]
         shorter = {"population": options.population, "generations": options.generations}
         whole = {**changes, **COMMON, **shorter, "simulation.threads": options.threads}
         runs = create_seeds(load(preset, whole), options.seeds, folder)
-    evolve_together(runs, [lambda progress: None] * len(runs))
+    told: list[int] = []
+    evolve_together(runs, [lambda progress: told.append(progress.generation)] * len(runs))
     for run in runs:
         with Store.open(run.record_path, write=True) as store:
-            if not store.finalists():
+            if len(told) > len(runs) or not store.finalists():  # it went on
                 crown(run, store)
     return runs
 
