@@ -40,6 +40,7 @@ class Lineage:
         from evolve.errors import RunError
         from evolve.fitness import UNITS
         from evolve.reports.family import line, steps
+        from evolve.reports.units import in_units
         from evolve.run import Run
 
         run = Run.open(self.directory)
@@ -52,7 +53,8 @@ class Lineage:
         shown = way if self.whole else steps(way)
         console.print(
             f"#{way[-1].id}: {len(everybody) - 1:,} ancestors, {len(way) - 1} steps from the "
-            f"first, {len(shown)} individuals shown; fitness in {UNITS[run.config.task.fitness]}",
+            f"first, {len(shown)} individuals shown; "
+            f"{in_units('fitness', UNITS[run.config.task.fitness])}",
             highlight=False,
             soft_wrap=True,
         )

@@ -11,6 +11,7 @@ import numpy as np
 from evolve.config import DESCRIPTORS, RunConfig
 from evolve.fitness import UNITS
 from evolve.optimizers.map_elites import MapElitesSettings
+from evolve.reports.units import titled
 from evolve.run import Run
 from evolve.store import Store
 
@@ -123,7 +124,7 @@ def heat_map(
         first, second, found.fitness.T, cmap="viridis", vmin=low, edgecolors="white", linewidth=0.4
     )
     ax.set_facecolor("#eceef0")
-    ax.figure.colorbar(mesh, ax=ax, label=f"{fitness} [{UNITS[fitness]}]", pad=0.02)
+    ax.figure.colorbar(mesh, ax=ax, label=titled(fitness, UNITS[fitness]), pad=0.02)
     ball = {"boxstyle": "circle,pad=0.18", "facecolor": "white", "edgecolor": "#1f2328"}
     for number, (x, y) in enumerate([] if marked is None else marked, 1):
         x, y = np.clip(x, first[0], first[-1]), np.clip(y, second[0], second[-1])
@@ -141,4 +142,4 @@ def heat_map(
 
 def _label(name: str) -> str:
     unit = UNITS.get(name, "")
-    return f"{name} [{unit}]" if unit and unit != name else name
+    return titled(name, "" if unit == name else unit)

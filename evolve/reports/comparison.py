@@ -11,6 +11,7 @@ import numpy as np
 from evolve.config import RunConfig
 from evolve.fitness import UNITS
 from evolve.provenance import decisive
+from evolve.reports.units import titled
 from evolve.run import Run
 from evolve.store import Finalist, Record
 
@@ -115,7 +116,7 @@ def compare(ax: Axes, several: Sequence[Group], fitness: str = "speed") -> Axes:
         label = f"{group.label} ({count} seed{'s' if count > 1 else ''})"
         ax.plot(curve.evaluations, curve.mean, line, color=color, linewidth=1.9, label=label)
     ax.set_xlabel("evaluations")
-    ax.set_ylabel(f"best {fitness} so far [{UNITS[fitness]}]")
+    ax.set_ylabel(titled(f"best {fitness} so far", UNITS[fitness]))
     ax.set_xlim(left=0.0)
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     ax.xaxis.set_major_formatter(lambda x, _: f"{x:,.0f}")

@@ -10,6 +10,7 @@ import numpy as np
 from evolve.fitness import UNITS
 from evolve.reports.export import trial
 from evolve.reports.plots import figure
+from evolve.reports.units import titled
 from evolve.store import Ancestor
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def family_tree(ax: Axes, everybody: Sequence[Ancestor], unit: str = "") -> Axes
     way = np.array([known[one.id] for one in line(everybody)])
     ax.plot(*way.T, "o-", color="#c8452d", markersize=4.5, linewidth=1.6, label="fitter parents")
     ax.set_xlabel("generation")
-    ax.set_ylabel(f"fitness [{unit}]" if unit else "fitness")
+    ax.set_ylabel(titled("fitness", unit))
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.grid(axis="y", color="#8a8d91", alpha=0.25, linewidth=0.8)
     ax.spines[["top", "right"]].set_visible(False)

@@ -12,6 +12,7 @@ from evolve.config import RunConfig, SecondLookConfig
 from evolve.errors import RunError
 from evolve.fitness import UNITS
 from evolve.reports.plots import dot_plot, figure, learning_curve
+from evolve.reports.units import with_unit
 from evolve.run import Run
 from evolve.store import Finalist, Record, Store
 
@@ -53,7 +54,8 @@ def verdict(finalists: Sequence[Finalist], config: RunConfig) -> str:
     """
     first = finalists[0]
     who = f"#{first.id} of generation {first.generation}"
-    figures = f"{first.fitness:.3f} {UNITS[config.task.fitness]}; {_second_look(first)}"
+    best = with_unit(f"{first.fitness:.3f}", UNITS[config.task.fitness])
+    figures = f"{best}; {_second_look(first)}"
     if first.survives:
         return f"champion {who}: {figures}: survives"
     count = len(finalists)
@@ -124,8 +126,8 @@ def results(store: Store, config: RunConfig) -> Iterator[tuple[str, str]]:
         best = int(np.nanargmax(record.fitness))
         yield (
             "best",
-            f"{record.fitness[best]:.4g} {UNITS[config.task.fitness]} "
-            f"(#{record.ids[best]}, generation {record.generations[best]})",
+            with_unit(f"{record.fitness[best]:.4g}", UNITS[config.task.fitness])
+            + f" (#{record.ids[best]}, generation {record.generations[best]})",
         )
     if finalists := store.finalists():
         yield "verdict", verdict(finalists, config)

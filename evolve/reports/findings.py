@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evolve.reports.comparison import Group, best_so_far
+from evolve.reports.units import in_units, with_unit
 from evolve.store import Finalist, Record
 
 __all__ = ["findings"]
@@ -37,7 +38,8 @@ def _progress(record: Record, unit: str) -> Iterator[str]:
     if not np.isfinite(best[-1]) or not len(first):
         return
     start, end = float(first.max()), float(best[-1])
-    yield f"The best of the first generation had {start:.3f}, the best of all {end:.3f} {unit}."
+    figure = with_unit(f"{end:.3f}", unit)
+    yield f"The best of the first generation had {start:.3f}, the best of all {figure}."
     if end > start:
         half = int(np.argmax(best >= start + 0.9 * (end - start))) + 1
         count = len(best)
@@ -87,4 +89,5 @@ def _ranking(several: Sequence[Group], unit: str) -> Iterator[str]:
     at = [float(np.interp(shared, c.evaluations, c.mean)) for c in curves]
     order = np.argsort([-np.inf if np.isnan(v) else v for v in at])[::-1]
     words = "; ".join(f"{several[i].label}: {at[i]:.3f}" for i in order)
-    yield f"After {shared:,} evaluations, means of the best so far in {unit} are {words}."
+    means = in_units("means of the best so far", unit)
+    yield f"After {shared:,} evaluations, {means} are {words}."

@@ -12,6 +12,7 @@ import numpy as np
 from evolve.fitness import UNITS
 from evolve.reports.export import trial
 from evolve.reports.figures import clock, metric
+from evolve.reports.units import with_unit
 from evolve.run import Progress, Run
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ class Live:
             ws.html_page(
                 film,
                 names={0: f"#{individual}"},
-                custom_data={0: {run.config.task.fitness: f"{fitness:.3f} {unit}"}},
+                custom_data={0: {run.config.task.fitness: with_unit(f"{fitness:.3f}", unit)}},
                 title=f"#{individual} of {run.directory.name}",
             )
         )

@@ -20,6 +20,7 @@ from evolve.reports.parameters import parameters
 from evolve.reports.plots import dot_plot, figure, learning_curve, performance
 from evolve.reports.subject import Subject, examine, share
 from evolve.reports.tables import write_table
+from evolve.reports.units import in_units, titled, with_unit
 from evolve.reports.watch import watch
 from evolve.run import Run
 from evolve.store import Store
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["REPORT", "write_report"]
 
 REPORT = "report.html"
+LONG_LINE = 70
+"""Letters of a command that goes into several lines."""
 FILES = {
     "champion.usdc": "animation of the champion, OpenUSD",
     "zoo.usdc": "animation of the best, side by side",
@@ -126,7 +129,8 @@ def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
     if finalists:
         report.verdict(verdict(finalists, config), good=finalists[0].survives)
     else:
-        best = f"#{subject.zoo[0]} with {subject.fitness(subject.zoo[0]):.3f} {subject.unit}"
+        figure = with_unit(f"{subject.fitness(subject.zoo[0]):.3f}", subject.unit)
+        best = f"#{subject.zoo[0]} with {figure}"
         report.verdict(f"not looked at twice yet; the best so far is {best}", good=False)
     if not complete:
         report.text(
@@ -134,7 +138,7 @@ def _summary(report: ws.Document, subject: Subject, store: Store) -> None:
         )
     springs, evaluating, driving = store.totals()
     first = finalists[0] if finalists else None
-    tiles = [(f"{config.task.fitness} of the best [{subject.unit}]",
+    tiles = [(titled(f"{config.task.fitness} of the best", subject.unit),
               f"{subject.fitness(subject.zoo[0]):.3f}")]  # fmt: skip
     if first:
         tiles.append(("left at half the time step", share(first.halved_kept)))
@@ -266,8 +270,8 @@ def _comparison(report: ws.Document, subject: Subject, several: Sequence[Group])
         rows,
         ("runs", "seeds", "evaluations", "mean of the best", "standard error", "best of all",
          "champions from perturbed starts"),
-        caption=f"{subject.run.config.task.fitness} in {subject.unit}; evaluations of the shortest "
-        "seed.",
+        caption=f"{in_units(subject.run.config.task.fitness, subject.unit)}; evaluations of the "
+        "shortest seed.",
     )  # fmt: skip
 
 
@@ -290,14 +294,17 @@ def _parameters(report: ws.Document, subject: Subject, store: Store) -> None:
 
 def _again(report: ws.Document, subject: Subject, runs: Sequence[Run], store: Store) -> None:
     report.section("Make it again")
-    report.code(
+    lines = [
         f"evolve run {_folder(subject.run)}/run.toml --out again",
         "evolve digest again",
         f"# {dict(results(store, subject.run.config))['digest']}",
         "evolve report again",
-        "# this file:",
-        " \\\n  ".join(["evolve report", *map(_folder, runs)]),
-    )
+    ]
+    if len(runs) > 1:
+        words = ["evolve report", *map(_folder, runs)]
+        long = sum(map(len, words)) > LONG_LINE
+        lines += ["# and beside the others:", (" \\\n  " if long else " ").join(words)]
+    report.code(*lines)
     report.text(
         "The digest is a hash of everything the run decided: the same configuration on the same "
         "kind of machine gives the same."

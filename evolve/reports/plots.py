@@ -8,6 +8,7 @@ import numpy as np
 
 from evolve.fitness import UNITS
 from evolve.reports.comparison import best_so_far
+from evolve.reports.units import titled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -171,7 +172,7 @@ def _legend_above(ax: Axes) -> None:
 def _dress(ax: Axes, fitness: str, right: float) -> None:
     """Labels, limits and a light grid."""
     ax.set_xlabel("evaluations")
-    ax.set_ylabel(f"{fitness} [{UNITS[fitness]}]")
+    ax.set_ylabel(titled(fitness, UNITS[fitness]))
     ax.set_xlim(0.0, right * 1.02)
     ax.set_ylim(bottom=0.0)
     ax.margins(y=0.12)

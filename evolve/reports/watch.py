@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from evolve.judging.evaluate import Evaluator
 from evolve.reports.subject import Subject, share
+from evolve.reports.units import with_unit
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -48,7 +49,9 @@ def _page_facts(subject: Subject) -> Iterator[dict[str, str]]:
     found = {f.id: f for f in subject.finalists}
     for individual in subject.zoo:
         facts = {
-            subject.run.config.task.fitness: f"{subject.fitness(individual):.3f} {subject.unit}"
+            subject.run.config.task.fitness: with_unit(
+                f"{subject.fitness(individual):.3f}", subject.unit
+            )
         }
         if finalist := found.get(individual):
             facts["generation"] = f"{finalist.generation:,}"

@@ -276,6 +276,7 @@ class Show {
     this.goAlong();
     const look = { color: $("color").value, skin: $("skin").checked };
     this.painter.draw(this.camera, moment, look, this.shownBox(moment), this.signs(moment));
+    $("stage").classList.add("drawn");
     $("time").value = this.time;
     $("clock").textContent = (this.scene.times[0] + this.time).toFixed(2) + " s";
     const share = this.duration ? this.time / this.duration : 0;

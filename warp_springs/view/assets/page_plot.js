@@ -21,7 +21,7 @@ class Plot {
   show(title, unit, times, series, note = "", timeUnit = " s") {
     Object.assign(this, { times, series, timeUnit });
     const keys = series.map(({ name, color }) => `<span><i style="background:${color}"></i>${escaped(name)}</span>`);
-    this.title.innerHTML = `<b>${escaped(title)} [${escaped(unit)}]</b>` + keys.join("") + (note ? `<span>${escaped(note)}</span>` : "");
+    this.title.innerHTML = `<b>${escaped(title)}${unit ? ` [${escaped(unit)}]` : ""}</b>` + keys.join("") + (note ? `<span>${escaped(note)}</span>` : "");
     const count = times.length;
     const base = new Float64Array(count);
     let low = 0, high = 0;
