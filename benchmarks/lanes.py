@@ -83,7 +83,8 @@ def simulate(robots: Sequence[ws.Robot], scene: ws.Scene, **options) -> ws.Simul
     sim, steps = ws.Simulation(robots, scene, DT, **options), 20
     result = sim.run(steps * DT)
     for index in (0, len(robots) - 1):
-        truth = Trial(robots[index], scene, DT, sim.integrator).run(steps)[0][-1]
+        substeps = int(sim.contact_substeps[index])
+        truth = Trial(robots[index], scene, DT, sim.integrator, substeps).run(steps)[0][-1]
         error = np.abs(result.positions(index) - truth).max()
         if not error < ALLOWED[sim.precision]:
             raise SystemExit(f"robot {index} of {robots!r} is {error:.1e} m off the reference")

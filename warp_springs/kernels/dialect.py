@@ -70,9 +70,15 @@ _TYPES = {
 # (1 - e)^(-1/2), to e for float32 and to e^3 for float64, leaves the last bit or two; 2 + e is
 # 3 - a y^2. Processors without the estimate take square root and division.
 _SERIES = {
-    "float32": "(h * y) * (scalar(3) - (a * y) * y)",
-    "float64": "(h * y) * (scalar(2) + e * (scalar(1) + e * (scalar(0.75) + e * scalar(0.625))))",
+    "float32": "(h * y) * (three - (a * y) * y)",
+    "float64": "(h * y) * (two + e * (one + e * (second + e * third)))",
 }
+# Read once, before the steps: a constant would be fetched from memory again for every spring.
+_TERMS = """
+    const volatile scalar terms[5] = {1, 2, 3, 0.75, 0.625};
+    const real one = zero + terms[0], two = zero + terms[1], three = zero + terms[2];
+    const real second = zero + terms[3], third = zero + terms[4];
+"""
 
 
 def _on_both(name: str, own: str, root: str = "") -> str:
@@ -129,7 +135,8 @@ def vector_dialect(precision: str, width: int) -> str:
     auto widen = [](real a) -> wide {{ return __builtin_convertvector(a, wide); }};
     auto any = [](mask m) -> bool {{ return __builtin_reduce_or(m) != 0; }};
     auto set_lane = [](real& a, int l, scalar value) {{ a[l] = value; }};
-    auto less_over_root = [](real k, real h, real a) __attribute__((always_inline)) -> real {{
+    {_TERMS}
+    auto less_over_root = [=](real k, real h, real a) __attribute__((always_inline)) -> real {{
     #if defined(__AVX512F__) && defined(__AVX512VL__)
         typedef scalar part __attribute__((vector_size(16)));
         typedef scalar whole __attribute__((vector_size({size * whole})));
@@ -141,12 +148,12 @@ def vector_dialect(precision: str, width: int) -> str:
             __builtin_memcpy(&y, &all, sizeof(y));
         }} else {{
             for (int l = 0; l < W; ++l) {{
-                part one = {{}};
-                one[0] = a[l];
-                y[l] = __builtin_ia32_{estimate}128_mask(one, one, (unsigned char)-1)[0];
+                part single = {{}};
+                single[0] = a[l];
+                y[l] = __builtin_ia32_{estimate}128_mask(single, single, (unsigned char)-1)[0];
             }}
         }}
-        const real e = scalar(1) - (a * y) * y;
+        const real e = one - (a * y) * y;
         return k - {_SERIES[name]};
     #else
         return k - (h + h) / __builtin_elementwise_sqrt(a);
