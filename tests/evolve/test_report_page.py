@@ -148,7 +148,7 @@ def test_the_comparison_is_in_the_report(page, runs):
     rows = page.evaluate("[...document.querySelectorAll('tr')].map(r => r.innerText)")
     mean = np.mean([seed.best for seed in groups(runs)[0].seeds])
     row = next(r for r in rows if r.startswith("genetic\t2\t"))
-    assert f"{mean:.4g}" in row.split("\t")
+    assert f"{mean:.3f}" in row.split("\t")
 
 
 def test_a_report_is_the_same_again(runs, written):
