@@ -2,7 +2,7 @@
 
     python -m benchmarks.body_search                     # every search, five seeds; resumes
     python -m benchmarks.body_search --only critter walker --seeds 2
-    python -m benchmarks.body_search --draw curves.png
+    python -m benchmarks.body_search --draw curves.png --gains
 
 Equal evaluations, physics, cycles and amplitudes; the fitness is `steady`, body diameters per cycle
 in the slower half of the measurement. Each search is a folder of runs, so that one that was stopped
@@ -123,6 +123,31 @@ def row(name: str, group: Group, fixed: bool) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def gains(runs: Sequence[Run]) -> str:
+    """How many children are fitter than all their parents, by whether their bodies are theirs."""
+    better, count = np.zeros(2), np.zeros(2)
+    for run in runs:
+        encoding = run.config.make_encoding()
+        with run.read() as store:
+            record = store.record()
+            worth = np.where(np.isfinite(record.fitness), record.fitness, -np.inf)
+            bodies: list[bytes] = []
+            for blobs, _ in store.judged():
+                robots = encoding.express(encoding.from_bytes(blobs))
+                bodies += [r.topology + r.positions.tobytes() for r in robots]
+            names, rows = store.table()
+            first, second = names.index("parent_1"), names.index("parent_2")
+            for row in rows:
+                parents = [row[place] - 1 for place in (first, second) if row[place]]
+                if parents:
+                    child = row[0] - 1
+                    changed = int(all(bodies[child] != bodies[one] for one in parents))
+                    count[changed] += 1
+                    better[changed] += worth[child] > max(worth[one] for one in parents)
+    kinds = zip(("a parent's body", "a body of their own"), better, count, strict=True)
+    return "; ".join(f"{n:,.0f} with {kind}: {b / max(n, 1):.1%} fitter" for kind, b, n in kinds)
+
+
 def draw(several: Sequence[Group], path: Path) -> None:
     """The learning curves, with standard errors."""
     page = figure(10.0, 5.6)
@@ -140,6 +165,7 @@ def main() -> None:
     parser.add_argument("--generations", type=int, default=COMMON["generations"])
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("runs") / "body-search")
+    parser.add_argument("--gains", action="store_true", help="which children of bodies are fitter")
     parser.add_argument("--draw", type=Path, help="picture of the learning curves")
     options = parser.parse_args()
     ws.quiet()
@@ -155,6 +181,8 @@ def main() -> None:
         fixed = runs[0].config.fixed_body or getattr(settings, "body_rate", 1.0) == 0.0
         seconds = time.perf_counter() - started
         print(f"{row(name, group, fixed)}  {seconds:.0f} s", flush=True)
+        if options.gains and not fixed:
+            print(f"  children, against their fittest parent: {gains(runs)}", flush=True)
     if options.draw is not None:
         draw(found, options.draw)
 

@@ -20,11 +20,13 @@ def test_a_search_is_run_once_and_told_and_drawn(tmp_path, monkeypatch, capsys):
     out, picture = tmp_path / "out", tmp_path / "curves.png"
     words = ["body_search", "--only", "walker, operators", "creature from walker", "--seeds", "2"]
     words += ["--population", "8", "--generations", "2", "--out", str(out), "--draw", str(picture)]
+    words += ["--gains"]
     monkeypatch.setattr("sys.argv", words)
     body_search.main()
-    first = [line.rpartition("|")[0] for line in capsys.readouterr().out.splitlines()]
+    first = [line.rpartition("|")[0] or line for line in capsys.readouterr().out.splitlines()]
     assert "| walker, operators | fixed | 16 | 2 |" in first[2]
     assert "| creature from walker | evolves | 16 | 2 |" in first[3]
+    assert " with a parent's body: " in first[4]
     assert picture.stat().st_size > 10_000
     kept = open_all(out / "walker-operators")
     topologies = set()
@@ -35,5 +37,5 @@ def test_a_search_is_run_once_and_told_and_drawn(tmp_path, monkeypatch, capsys):
         topologies |= {r.topology for r in encoding.express(encoding.from_bytes(genomes))}
     assert len(topologies) == 1, "its body stays as it is"
     body_search.main()
-    again = [line.rpartition("|")[0] for line in capsys.readouterr().out.splitlines()]
+    again = [line.rpartition("|")[0] or line for line in capsys.readouterr().out.splitlines()]
     assert again == first
