@@ -176,9 +176,10 @@ def main() -> None:
         started = time.perf_counter()
         runs = runs_of(name, options)
         (group,) = groups(runs)
-        found.append(replace(group, label=name))
         settings = runs[0].config.encoding
         fixed = runs[0].config.fixed_body or getattr(settings, "body_rate", 1.0) == 0.0
+        label = f"{name}: body {'fixed' if fixed else 'evolves'}"
+        found.append(replace(group, label=label))
         seconds = time.perf_counter() - started
         print(f"{row(name, group, fixed)}  {seconds:.0f} s", flush=True)
         if options.gains and not fixed:
