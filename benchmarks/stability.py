@@ -4,22 +4,27 @@
     python benchmarks/stability.py --figure stability.png --resolution 48    # about 2 minutes
     python benchmarks/stability.py --soak 100000 --resolution 0 --rest 0     # about 3 minutes
     python benchmarks/stability.py --rest 3600 --resolution 0 --soak 0       # about 10 minutes
+    python benchmarks/stability.py --limits --resolution 0 --soak 0 --rest 0 # about 3 minutes
 
 The maps show for each integrator how far a bouncing cube is from a reference over dt and spring
 stiffness, mass, ground stiffness, and where it is unstable, against ``ws.stable_dt``. The soak runs
-absurd robots between healthy ones. The rest leaves robots alone. Exits with 1 if a promise is not
-kept: an unstable cell below the bound, a failure of the soak, a robot that does not stay where it
+absurd robots between healthy ones. The rest leaves robots alone. The limits say for every shape in
+many worlds how far above ``ws.stable_dt`` a step becomes unstable. Exits with 1 if a promise is not
+kept: an unstable step below the bound, a failure of the soak, a robot that does not stay where it
 rests.
 """
 
 import argparse
+import itertools
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
+import stability_limits
 import stability_maps
 import stability_rest
 import stability_soak
@@ -46,6 +51,8 @@ def main() -> int:
         report["soak"] = _soak(console, args, broken)
     if args.rest:
         report["rest"] = _rest(console, args, broken)
+    if args.limits is not None:
+        report["limits"] = _limits(console, args, broken)
     if args.json:
         args.json.write_text(json.dumps(report) + "\n")
         console.print(f"wrote {args.json}")
@@ -68,6 +75,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the garbage")
     parser.add_argument(
         "--rest", type=float, default=60.0, metavar="SECONDS", help="simulated seconds of rest"
+    )
+    worlds = list(stability_limits.WORLDS)
+    parser.add_argument(
+        "--limits",
+        nargs="*",
+        choices=worlds,
+        metavar="WORLD",
+        help=f"measured limits over the bound; all but the last, or of {', '.join(worlds)}",
     )
     parser.add_argument("--json", type=Path, help="also write everything to this file")
     args = parser.parse_args()
@@ -158,6 +173,29 @@ def _rest(console: Console, args: argparse.Namespace, broken: list[str]) -> list
     )
     console.print(table)
     return [asdict(row) for row in rows]
+
+
+def _limits(console: Console, args: argparse.Namespace, broken: list[str]) -> dict:
+    """Measured limits over the bound: world -> integrator -> shape -> ratio."""
+    worlds, shapes = args.limits or list(stability_limits.WORLDS)[:-1], stability_limits.SHAPES
+    table = Table("world", "integrator", *shapes)
+    report, integrators = {}, stability_limits.INTEGRATORS
+    with _bar(console, "limits") as progress:
+        for done, (world, integrator) in enumerate(itertools.product(worlds, integrators), 1):
+            found = {s: stability_limits.measure(s, world, integrator) for s in shapes}
+            report.setdefault(world, {})[integrator] = {
+                shape: ratio if math.isfinite(ratio) else None for shape, ratio in found.items()
+            }
+            table.add_row(world, integrator, *(f"{r:.2f}" for r in found.values()))
+            broken += [
+                f"{shape}, {world}, {integrator}: unstable at {ratio:.2f} times ws.stable_dt"
+                for shape, ratio in found.items()
+                if ratio < 1.0
+            ]
+            progress(done / len(worlds) / len(integrators))
+    console.print("smallest unstable step over ws.stable_dt; inf: none up to 2.9 times the bound")
+    console.print(table)
+    return report
 
 
 @contextmanager

@@ -74,6 +74,42 @@ def test_a_mass_on_a_ramp_sticks_below_the_angle_of_friction_and_slides_above(in
         assert np.abs(energy.residual).max() < 1e-3
 
 
+WEDGES = {
+    "edge": ((-4, 0, -8), [(0, 0, 1), (1, 0, 0)]),
+    "corner": ((-4, -4, -8), [(0, 0, 1), (1, 0, 0), (0, 1, 0)]),
+    "valley": ((0, 0, -9.81), [(1, 0, 1), (-1, 0, 1)]),
+}
+
+
+@pytest.mark.parametrize("integrator", ["chin4", "leapfrog"])
+@pytest.mark.parametrize("wedge", WEDGES)
+def test_what_rests_against_several_surfaces_rests(cube, wedge, integrator):
+    # Friction of one surface must not take, or give, what another pushes along it.
+    gravity, normals = WEDGES[wedge]
+    if wedge == "valley":
+        cube = cube.moved(-cube.center_of_mass).rotated((0, 1, 0), np.pi / 4)
+        cube = cube.moved((0, 0, -cube.bounds[0, 2]))
+    planes = [ws.Plane(normal) for normal in normals]
+    for dt in (5e-4, 1.4e-3):  # the latter is nine tenths of the stable step in a corner
+        options = {"dt": dt, "gravity": gravity, "obstacles": planes, "integrator": integrator}
+        laid = cube.replace(positions=run(cube, 3.0, damping=20.0, **options).positions(0))
+        result = run(laid, 20.0, **options)
+        assert result.status[0] == ws.Status.OK
+        assert np.abs(result.frames(0) - result.frames(0)[0]).max() < 1e-8
+        assert np.abs(result.energy.residual).max() < 1e-5  # J; 0.8 J lift it by an edge
+        assert result.energy.kinetic.max() < 1e-5
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_mass_slides_along_a_groove_as_far_as_both_its_sides_let_it(integrator):
+    sides = [ws.Plane((x, 0, 1), static_friction=0.6, kinetic_friction=0.4) for x in (1, -1)]
+    start = POINT.moved((0, 0, -0.1 * 9.81 / 1e5)).moving((0, 2.0, 0))
+    result = run(start, 2.0, integrator, 2e-4, obstacles=sides)
+    expected = 2.0**2 / (2 * np.sqrt(2) * 0.4 * 9.81)
+    assert result.positions(0)[0, 1] == pytest.approx(expected, rel=1e-3)
+    assert result.energy.friction_loss[0, -1] == pytest.approx(0.2, rel=1e-4)
+
+
 def test_a_ramp_as_an_obstacle_is_the_ground_under_a_tilted_gravity(cube):
     angle = 0.4
     plane, _ = slope(angle, static_friction=0.6, kinetic_friction=0.3)

@@ -29,7 +29,8 @@ auto enter_step = [=](real* ledger, const Losses& losses, const Losses& rubbed, 
     if (!LEDGER) return;
     if (OBSTACLES) {
         enter(ledger, losses, before, pick(rubbed.stuck, before, kicked), w);
-        enter(ledger, rubbed, pick(rubbed.stuck, before, kicked), after, w);
+        enter(ledger, rubbed, pick(rubbed.stuck, before, rubbed.mean),
+              pick(rubbed.stuck, after, rubbed.mean), w);
         return;
     }
     const mask slides = (after.x != zero) | (after.y != zero);

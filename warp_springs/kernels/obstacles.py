@@ -142,44 +142,85 @@ auto obstacle_energy = [=](const Place& x, const Own& own) -> real {
 
 # What touching does.
 MEETING = r"""
-// Coulomb's law against the tangential velocity u, for a surface with friction of its own.
+// What Coulomb's law leaves of the tangential velocity u, for a surface with friction of its own.
 auto rub_surface = [=](Vec u, real hold, real impulse, const Own& own, const double* o)
         __attribute__((always_inline)) -> Vec {
     const real factor = coulomb(square_root(dot(u, u)), hold, impulse,
-                                       static_friction_of(own, scalar(o[2])),
-                                       kinetic_friction_of(own, scalar(o[3])));
+                                static_friction_of(own, scalar(o[2])),
+                                kinetic_friction_of(own, scalar(o[3])));
     return scaled(u, factor);
 };
 
+// How a mass met a surface: its normal, what it can hold and what its impulse was; see touch_down.
+struct Meeting { Vec n; real hold, impulse; };
+
+// Friction of the surfaces that were met, once all have pushed: on the mean velocity of the drift,
+// which tells how far the mass went. What sticks to one surface then keeps its place along it, also
+// where another would push it that way, and a mass in a corner rests. What one surface pushes along
+// another it pushes evenly, in both drifts of a step.
+auto rub_on_surfaces = [=](const Meeting* met, mask wedged, Sum& v, Vec& mean, Vec& bow,
+                           const Own& own, Losses& losses) {
+    for (int k = 0; k < OBSTACLES; ++k) {
+        const double* const o = obstacles + RECORD * k;
+        const real mu_s = static_friction_of(own, scalar(o[2]));
+        const real mu_k = kinetic_friction_of(own, scalar(o[3]));
+        const mask rubs = (met[k].impulse > zero) & ((mu_s > zero) | (mu_k > zero));
+        if (!any(rubs)) continue;
+        const Vec n = met[k].n, rise = scaled(n, dot(n, mean)), slip = mean - rise;
+        const real impulse = met[k].impulse, least = select(wedged, impulse, zero);
+        const real hold = select(met[k].hold > least, met[k].hold, least);
+        const real left = coulomb(square_root(dot(slip, slip)), hold, impulse, mu_s, mu_k);
+        const mask stuck = rubs & (left <= zero);
+        const Vec lost = pick(rubs, scaled(slip, scalar(1) - left), Vec{zero, zero, zero});
+        const real part = select(stuck, zero, (left + scalar(1)) * scalar(0.5));
+        replace_where(rubs, v, v - lost);
+        mean = pick(rubs, rise + scaled(slip, part), mean);
+        if (CHIN4) bow = pick(rubs, scaled(n, dot(n, bow)), bow);
+        if (!LEDGER) continue;
+        losses.friction = losses.friction + lost;
+        losses.stuck |= stuck;
+    }
+    if (LEDGER) losses.mean = mean;
+};
+// A place after a drift of this mean velocity.
+auto moved_on = [=](Sum from, Vec mean) __attribute__((always_inline)) -> Sum {
+    add(from, mean, span);
+    return from;
+};
 // A mass that its drift took from `from` to x, after a kick by the acceleration a, is stopped and
 // turned by the obstacles it meets. Gravity, a kick here, acts together with their forces, so that
 // a mass at rest stays at rest.
 auto meet_obstacles = [=](Sum& x, Sum& v, const Sum& from, Vec a, real w, int substeps, bool last,
                           const Own& own, Losses& losses) {
     const Vec gravity = {zero + gravity_x, zero + gravity_y, zero + gravity_z};
+    const scalar bow_rate = (bow_before(last) - bow_after(last)) / span;
+    Meeting met[OBSTACLES ? OBSTACLES : 1];
+    Vec mean = v, bow = {zero, zero, zero};  // how far the stages of a step leave its ends
+    real surfaces = zero;
     for (int k = 0; k < OBSTACLES; ++k) {
         const double* const o = obstacles + RECORD * k;
         const Touch end = touch(o, in_world(x));
         const mask touching = (end.gap < zero) | (touch(o, in_world(from)).gap < zero);
+        met[k] = Meeting{end.n, zero, zero};
         if (!any(touching)) { if (CHIN4) own.left_over[k] = zero; continue; }
         const real speed = dot(v, end.n), stiffness = contact_stiffness(own, scalar(o[1]));
-        real z = end.gap - dot(end.n, way_between(from, x)), u = speed;
+        real z = end.gap - dot(end.n, mean) * span, u = speed;
         const real back = taken_back(z, u, stiffness, w, zero, dot(a, end.n),
                                      dot(gravity, end.n), last);
-        real impulse = contact_flow(z, u, stiffness, w, zero, back, substeps, last);
-        impulse = select(touching, impulse, zero);
-        const Vec along = v - scaled(end.n, speed);
-        real hold = impulse;
-        if (CHIN4) share_hold(hold, impulse, own.left_over[k], last);
-        const Vec rubbed = rub_surface(along, hold, impulse, own, o);
-        if (LEDGER) losses.friction = losses.friction + (along - rubbed);
-        const mask stuck = dot(rubbed, rubbed) <= zero;
-        if (LEDGER) losses.stuck |= touching & stuck;
-        const Vec mean = scaled(along + rubbed, select(stuck, zero, zero + scalar(0.5)));
-        const Vec shift = scaled(mean - along, zero + span);
-        add(x, pick(touching, scaled(end.n, z - end.gap) + shift, Vec{}), scalar(1));
-        replace_where(touching, v, scaled(end.n, u) + rubbed);
+        const real impulse = contact_flow(z, u, stiffness, w, zero, back, substeps, last);
+        met[k].hold = met[k].impulse = select(touching, impulse, zero);
+        if (CHIN4) share_hold(met[k].hold, met[k].impulse, own.left_over[k], last);
+        replace_where(touching, v, v + scaled(end.n, u - speed));
+        mean = pick(touching, mean + scaled(end.n, (z - end.gap) / span), mean);
+        if (CHIN4) bow = pick(touching, bow + scaled(end.n, dot(a, end.n) * bow_rate), bow);
+        keep_where(touching, x, moved_on(from, mean));
+        surfaces += select(touching, zero + scalar(1), zero);
     }
+    if (!any(surfaces > zero)) return;
+    mean = mean - bow;
+    rub_on_surfaces(met, surfaces > scalar(1.5), v, mean, bow, own, losses);
+    keep_where(surfaces > zero, x, moved_on(from, mean + bow));
+    if (LEDGER) losses.stuck &= surfaces < scalar(1.5);
 };
 
 // The same for symplectic Euler, before its drift: forces at x.

@@ -89,19 +89,18 @@ auto from_here = [=](Vec place, const Sum& x) __attribute__((always_inline)) -> 
     const Place here = in_world(x);
     return Place{(place - x) + here, far_of(place - x) + here.exact};
 };
-// A place in the world as counted from the origin, the way to it from one that is, and the way
-// between two.
+// A place in the world as counted from the origin, and the way to it from one that is.
 auto from_origin = [=](Far place) __attribute__((always_inline)) -> Far {
     return place - Far{far_origin[0], far_origin[1], far_origin[2]};
 };
 auto way_from = [=](Vec x, Far place) __attribute__((always_inline)) -> Vec {
     return near_of(from_origin(place) - far_of(x));
 };
-auto way_between = [](const Sum& a, const Sum& b) __attribute__((always_inline)) -> Vec {
-    return (b - a) + (b.low - a.low);
-};
 auto replace_where = [=](mask m, Sum& a, Vec by) __attribute__((always_inline)) {
     a = Sum{pick(m, by, Vec(a)), pick(m, Vec{}, a.low)};
+};
+auto keep_where = [=](mask m, Sum& a, const Sum& by) __attribute__((always_inline)) {
+    a = Sum{pick(m, Vec(by), Vec(a)), pick(m, by.low, a.low)};
 };
 #else
 typedef Vec Sum;
@@ -121,10 +120,10 @@ auto from_here = [](Vec place, const Sum&) __attribute__((always_inline)) -> Pla
 };
 auto from_origin = [](Far place) __attribute__((always_inline)) -> Far { return place; };
 auto way_from = [](Vec x, Far place) __attribute__((always_inline)) -> Vec { return place - x; };
-auto way_between = [](Vec a, Vec b) __attribute__((always_inline)) -> Vec { return b - a; };
 auto replace_where = [=](mask m, Vec& a, Vec by) __attribute__((always_inline)) {
     a = pick(m, by, a);
 };
+auto keep_where = replace_where;
 #endif
 // Adds to the horizontal components, or to the vertical one, a rate times a time.
 auto add_level = [=](Sum& sum, Vec rate, scalar time) __attribute__((always_inline)) {
@@ -154,6 +153,7 @@ auto settle_rest = [=](Sum& v) __attribute__((always_inline)) {
 #endif
 };
 
-// What damping, drag and friction took from a velocity between two drifts.
-struct Losses { Vec damping, drag, friction, outer; mask stuck; };
+// What damping, drag and friction took from a velocity between two drifts. Of obstacles: the mean
+// velocity of the drift, along which their friction works, and who sticks to a single one.
+struct Losses { Vec damping, drag, friction, outer, mean; mask stuck; };
 """
