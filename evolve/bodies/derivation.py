@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from evolve.bodies.graph_grammar import ANY, NO_JOINT, Edge, Grammar, Rule
 
@@ -35,9 +36,16 @@ class Tree:
     newest: int = 0
     """Largest number that was ever used."""
 
+    @cached_property
+    def _hanging(self) -> dict[int, list[int]]:
+        found: dict[int, list[int]] = {}
+        for number, node in self.nodes.items():
+            found.setdefault(node.parent, []).append(number)
+        return found
+
     def children(self, number: int) -> list[int]:
         """The parts that hang on one, in the order in which they came."""
-        return [n for n, node in self.nodes.items() if node.parent == number]
+        return self._hanging.get(number, [])
 
 
 def matches(tree: Tree, rule: Rule) -> list[Match]:
