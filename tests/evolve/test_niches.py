@@ -10,7 +10,7 @@ from evolve.optimizers import NOBODY, OPTIMIZERS
 from evolve.optimizers.novelty import loneliness
 from evolve.search import Search
 from evolve.toml import load
-from tests.evolve.test_optimizers import Vectors, make, search, sphere
+from tests.evolve.test_optimizers import Vectors, make, solve, sphere
 
 
 def test_loneliness_is_the_mean_distance_to_the_nearest_others():
@@ -69,7 +69,7 @@ def test_novelty_finds_what_fitness_leads_away_from():
 
 def test_the_archive_keeps_the_most_novel_of_every_generation():
     optimizer = make("novelty", archived=0.1, weight=1.0)
-    told = [search(optimizer, 1)[0] for _ in range(5)]
+    told = [solve(optimizer, 1)[0] for _ in range(5)]
     archive = optimizer.archive
     assert len(archive) == 20 and len(set(archive.tolist())) == 20
     for generation, individuals in enumerate(told):
@@ -99,7 +99,7 @@ def test_species_keep_two_peaks_and_are_as_many_as_they_should_be():
 
 def test_parents_are_of_one_species():
     optimizer = make("speciation", species=3)
-    search(optimizer, 6)
+    solve(optimizer, 6)
     species = np.repeat(np.arange(len(optimizer.sizes)), optimizer.sizes)
     of = dict(zip(optimizer._survivors.ids.tolist(), species.tolist(), strict=True))
     assert len(optimizer.sizes) > 1
@@ -142,7 +142,7 @@ def test_a_body_learns_before_it_competes():
 
 def test_learning_ages_bodies_by_their_own_generations():
     optimizer = make("learning", tries=2, lessons=2, bodies={"type": "age_fitness"})
-    search(optimizer, 8)
+    solve(optimizer, 8)
     assert optimizer.bodies.generation == 4
     assert optimizer.bodies._ages.max() == 3
 
