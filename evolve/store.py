@@ -1,7 +1,9 @@
 """The record of a run: one SQLite file that holds every evaluation and survives being killed.
 
 A generation is one transaction, so whatever moment the process dies at, the file holds whole
-generations and the state of the optimizer after the last of them. The tables are made to be
+generations and the state of the optimizer after the last of them. Nothing waits for the disk but
+SQLite's checkpoints: if the power fails, the last generations may be missing, and a resumed run
+computes them again, to the same bits. The tables are made to be
 asked in SQL::
 
     -- everybody the champion descends from
@@ -105,7 +107,7 @@ class Store:
         connection = sqlite3.connect(path, isolation_level=None)
         connection.execute("PRAGMA page_size = 16384")
         connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA synchronous = NORMAL")
         columns = "".join(f', "{name}" REAL' for name in descriptors)
         store = cls(connection, path)
         with store._transaction():
@@ -132,7 +134,7 @@ class Store:
         connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=30.0)
         try:
             schema.check(connection, path, thoroughly=write)
-            connection.execute("PRAGMA synchronous = FULL")
+            connection.execute("PRAGMA synchronous = NORMAL")
             connection.execute(f"PRAGMA query_only = {not write}")
         except BaseException:
             connection.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import os
 import time
@@ -320,7 +321,7 @@ class Simulation:
             energy=energy,
             spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
-            _slots=slots,
+            _slots=copy.deepcopy(slots),  # robots may move later
             _worn=self._worn(),
             _signals={i: s for p in self._pilots if p is not None for i, s in p.signals().items()},
             _positions=buffers["seen_positions"].copy(),

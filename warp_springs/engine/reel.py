@@ -40,6 +40,10 @@ class Reel:
         """Values of all robots in a frame."""
         return len(self._places)
 
+    def move(self, places: np.ndarray) -> None:
+        """The values are at other places from now on."""
+        self._places = places
+
     def take(self, frame: int, buffer: np.ndarray) -> None:
         """Keep what the buffer holds now."""
         if len(self):

@@ -16,6 +16,7 @@ from warp_springs.batch import Batch, Group, Slots
 from warp_springs.engine.control import Pilot, Reach
 from warp_springs.engine.crowd import Crowd, crowds
 from warp_springs.engine.packing import aligned
+from warp_springs.engine.ranks import Ranks
 from warp_springs.engine.reel import Reel
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
@@ -81,6 +82,8 @@ class Slice:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
         self._features, self.precision = group.features, group.features.precision
+        table = buffers["bundles"].reshape(-1, len(BUNDLE))[first:last]
+        self.ranks = Ranks(group.features, table, first, buffers)
         real = real_dtype(group.features.precision)
         size = scratch_size(group.features, *largest) + SCRATCH_GAP
         given = {
@@ -187,10 +190,19 @@ class Tape:
         self.signals = Reel.of(count, {robot: np.arange(*asked[robot]) for robot in some})
         some = [robot for robot in self.recorded.tolist() if robot in self.wearing]
         self.flowed = Reel.of(count, {robot: flow_places(*self.wearing[robot]) for robot in some})
-        self._lanes = self.slots.lane_indices(self.members, ENERGIES)
         self.energies = np.empty((count if self.energy else 0, len(self.members), ENERGIES))
+        self._find_lanes()
+
+    def _find_lanes(self) -> None:
+        self._lanes = self.slots.lane_indices(self.members, ENERGIES)
         bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
         self._which = None if self.energy else _on_device(bundles)
+
+    def _close_ranks(self) -> None:
+        """Let robots move to where those that were stopped leave a lane."""
+        if self.slice.ranks.close(self.slots):
+            self.frames.move(self.slots.state_indices(self.recorded))
+            self._find_lanes()
 
     def run(self, first: int, last: int, stop: threading.Event) -> None:
         """Step the slice from ``first`` to ``last``, with the frames between."""
@@ -211,6 +223,8 @@ class Tape:
             until = min(at + steps, target)
             if self.pilot is not None:
                 until = min(until, self.pilot.until(at))
+            elif isinstance(self.slice, Slice):
+                self._close_ranks()
             self.slice.advance(at, until)
             at = until
             self.done = at - first

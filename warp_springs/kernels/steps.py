@@ -9,7 +9,7 @@ STEPS = r"""
 const long long past = (long long)last_step * division_;
 prepare();
 begin();
-bool gone = all_stopped();  // nobody is left to step
+bool gone = all_stopped();  // nobody is left to step, now or later
 for (long long n = (long long)first_step * division_; n < past; ++n) {
     if (n % CHECK_EVERY == 0) {
         end();
@@ -18,10 +18,14 @@ for (long long n = (long long)first_step * division_; n < past; ++n) {
         gone = all_stopped();
         if (ACTUATED) set_oscillators(n);
     }
-    if (gone) {
-        turn_oscillators();
-        if (CHIN4) turn_oscillators();
-        continue;
+    if (gone) {  // only the clock of the muscles goes on
+        const long long latest = (past - 1) / CHECK_EVERY * CHECK_EVERY;
+        if (ACTUATED && latest > n) { n = latest; set_oscillators(n); }
+        for (; ACTUATED && n < past; ++n) {
+            turn_oscillators();
+            if (CHIN4) turn_oscillators();
+        }
+        break;
     }
     const bool start = n == 0;
     const scalar time = EULER ? dt : start ? FIRST_KICK : FIRST_KICK * scalar(2);
