@@ -1,16 +1,15 @@
 """Packing: robots in, one flat buffer for each quantity out.
 
-Robots are grouped by what their kernel must be able to do and by their topology; W robots of one
-topology share a bundle, one in each SIMD lane (see ``kernels.lanes``). A robot that is left over,
-because nobody shares its topology, becomes a bundle of width one. What a robot's kernel can do is
-decided by the robot alone, never by its neighbours, so its bits do not depend on its batch.
+Robots are grouped by what their kernel must be able to do and by their topology; W of them share a
+bundle, one in each SIMD lane (see ``kernels.lanes`` and ``engine.grouping``). What a robot's kernel
+can do is decided by the robot alone, never by its neighbours, so its bits do not depend on its
+batch.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,12 +26,12 @@ from warp_springs.engine.element_packing import (
     spring_columns,
     traits_of,
 )
-from warp_springs.engine.merging import unions
+from warp_springs.engine.grouping import Grouping
 from warp_springs.engine.method import Method
 from warp_springs.engine.packing import (
     Strip,
     aligned,
-    breathes,
+    aligned_empty,
     coefficients,
     lane_major,
     largest,
@@ -45,9 +44,7 @@ from warp_springs.engine.packing import (
 )
 from warp_springs.engine.slots import Slots
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
-from warp_springs.kernels.dialect import native_width
 from warp_springs.kernels.lanes import Features
-from warp_springs.kernels.traits import MERGED, PLAIN, Traits
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.stability import Status
@@ -82,10 +79,6 @@ PIECE = 8192
 
 #: What lanes of a bundle of different robots hold where one has no mass: far above the ground.
 NOBODY = {"positions": (0.0, 0.0, 1e6)}
-
-#: What robots that one kernel steps have in common: the width of their bundles, whether they
-#: actuate, their layout, their traits.
-Kind = tuple[int, bool, str, Traits]
 
 
 @dataclass(frozen=True)
@@ -137,7 +130,7 @@ class Batch:
         bodies: Mapping[int, np.ndarray] | None = None,
     ) -> None:
         self.robots, self._bodies = robots, bodies or {}
-        self._scene, self._method, self._layout_of = scene, method, layout_of
+        self._scene, self._method = scene, method
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
@@ -148,17 +141,16 @@ class Batch:
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._rows: list[tuple[np.ndarray, np.ndarray]] = []  # robots, and places of their masses
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
-        self._refused = np.zeros(len(robots), bool)  # their step is certainly unstable
+        self._grouping = Grouping(robots, scene, method, layout_of)
 
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            strips = self._strips(robots)
-            for kind in sorted(strips, key=_wide_first):
+            for kind, strips in self._grouping.strips().items():
                 first = len(self)
-                width, actuated, layout, traits = kind
-                for strip in strips[kind]:
+                width, actuated, layout, _ = kind
+                for strip in strips:
                     self._pack(strip, width, actuated)
-                features = self._features(width, actuated, traits)
+                features = self._grouping.features(kind)
                 self.groups.append(Group(features, first, len(self) - first, layout))
             self._finish()
 
@@ -166,132 +158,12 @@ class Batch:
         """Number of bundles."""
         return sum(map(len, self._tables)) if self._tables else 0
 
-    def _strips(self, robots: Sequence[Robot]) -> dict[Kind, list[Strip]]:
-        """The robots by kind, and by topology."""
-        width = native_width(self._method.precision)
-        strips: dict[Kind, list[Strip]] = defaultdict(list)
-        if self._scene.collisions is not None:
-            for index, robot in enumerate(robots):
-                strip = Strip.alike([index], [robot])
-                traits = replace(traits_of(robot.elements), colliding=True)
-                layout = self._layout_of(robot.n_masses)
-                strips[1, bool(breathes(strip)[0]), layout, traits].append(strip)
-            return strips
-        alone: dict[bool, list[int]] = defaultdict(list)
-        gathered: list[Strip] = []
-        by_hand: list[int] = []
-        for cohort in _cohorts(robots):
-            if isinstance(cohort, int):
-                lanes = self._layout_of(robots[cohort].n_masses) == "lanes"
-                (alone[robots[cohort].is_actuated] if lanes else by_hand).append(cohort)
-                continue
-            layout, traits = self._layout_of(int(cohort.masses[0])), traits_of(cohort.elements)
-            # A flat body is laid out by its own shape, not by that of the first of many.
-            if layout == "flat" and traits == PLAIN:
-                by_hand += cohort.ids.tolist()
-                continue
-            if layout == "flat":
-                gathered += [cohort.take(np.array([i])) for i in range(len(cohort.ids))]
-                continue
-            if layout == "block":
-                gathered.append(cohort)
-                continue
-            for actuated, members in self._alike(cohort):
-                # A robot that would be the only one of its bundle needs no other lanes.
-                if len(members) % width == 1 and traits != PLAIN:
-                    strips[1, actuated, "lanes", traits].append(cohort.take(members[-1:]))
-                    members = members[:-1]
-                elif len(members) % width == 1:
-                    alone[actuated].append(int(cohort.ids[members[-1]]))
-                    members = members[:-1]
-                if len(members):
-                    strips[width, actuated, "lanes", traits].append(cohort.take(members))
-        for actuated, ids in alone.items():
-            for kind, strip in self._merged(Strip.ragged(ids, [robots[i] for i in ids])):
-                strips[kind[0], actuated, "lanes", kind[1]].append(strip)
-        if by_hand:
-            gathered.append(Strip.ragged(by_hand, [robots[i] for i in by_hand]))
-        for cohort in gathered:
-            for (actuated, layout), strip in self._gathered(cohort, robots):
-                strips[1, actuated, layout, traits_of(cohort.elements)].append(strip)
-        return strips
-
-    def _merged(self, strip: Strip) -> Iterator[tuple[tuple[int, Traits], Strip]]:
-        """Robots that share their topology with nobody, in common bundles where that pays.
-
-        Where there are obstacles, a mass that is nobody's might touch one.
-        """
-        width = native_width(self._method.precision)
-        if width == 1 or self._scene.obstacles:
-            yield (1, PLAIN), strip
-            return
-        for _, alike in self._alike(strip):
-            part = strip.take(alike)
-            for members, union in unions(part, width):
-                some = replace(part.take(members), union=union)
-                yield (1, PLAIN) if union is None else (width, MERGED), some
-
-    def _gathered(
-        self, cohort: Strip, robots: Sequence[Robot]
-    ) -> Iterator[tuple[tuple[bool, str], Strip]]:
-        """Parts of a cohort that a layout other than the lanes may step together."""
-        layouts = np.array([self._layout_of(masses) for masses in cohort.masses.tolist()])
-        for actuated, members in self._alike(cohort):
-            for layout in np.unique(layouts[members]):
-                part = members[layouts[members] == layout]
-                ids = cohort.ids[part]
-                alike = cohort.take(part) if cohort.shared else None
-                yield (
-                    (actuated, str(layout)),
-                    alike or Strip.ragged(ids, [robots[i] for i in ids.tolist()]),
-                )
-
-    def _alike(self, cohort: Strip) -> Iterator[tuple[bool, np.ndarray]]:
-        """Members of a cohort that may share bundles: alike in actuation, step and sub-steps.
-
-        And alike in whether they are stepped at all: a bundle of the refused costs no time.
-        """
-        actuated = breathes(cohort)
-        levels = self._method.levels(cohort, self._scene)
-        substeps = self._method.substeps(cohort, self._scene, levels)
-        traits = np.stack([actuated, levels, substeps, self._refuse(cohort, levels)])
-        if (traits == traits[:, :1]).all():  # as robots of one body mostly are
-            yield bool(actuated[0]), np.arange(len(actuated))
-            return
-        kinds, kind = np.unique(traits, axis=1, return_inverse=True)
-        for index in range(kinds.shape[1]):
-            yield bool(kinds[0, index]), np.flatnonzero(kind.ravel() == index)
-
-    def _refuse(self, strip: Strip, levels: np.ndarray) -> np.ndarray:
-        """Look up which robots of a strip cannot be stepped so, shape (n,) bool."""
-        self._refused[strip.ids] = self._method.refused(strip, self._scene, levels)
-        return self._refused[strip.ids]
-
-    def _features(self, width: int, actuated: bool, traits: Traits) -> Features:
-        scene, ground = self._scene, self._scene.ground
-        obstacles = len(scene.obstacles) + (ground is not None) if scene.obstacles else 0
-        flat = ground is not None and not obstacles  # else it is one of the obstacles
-        return Features(
-            precision=self._method.precision,
-            width=width,
-            actuated=actuated,
-            ground=flat,
-            friction=ground.friction if flat and ground.has_friction else "none",
-            wind=scene.wind is not None,
-            water=scene.water is not None,
-            obstacles=obstacles,
-            traits=traits,
-            damping=scene.damping > 0.0,
-            drag=scene.drag > 0.0,
-            integrator=self._method.integrator,
-        )
-
     def _pack(self, strip: Strip, width: int, actuated: bool) -> None:
         """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
         n, method = len(strip.ids), self._method
         levels = method.levels(strip, self._scene)
         if not strip.shared or self._scene.collisions is not None:  # nobody asked before
-            self._refuse(strip, levels)
+            self._grouping.refuse(strip, levels)
         self.levels[strip.ids] = levels
         self.substeps[strip.ids] = method.substeps(strip, self._scene, levels)
         within = np.arange(n)
@@ -304,8 +176,7 @@ class Batch:
             elements = element_buffers(strip.fields, order, method.spans(levels))
         columns, springs, invalid = self._spring_tables(strip, width, order, actuated)
         self._tables.append(self._describe(strip, width, columns, elements))
-        for table in springs:
-            self._append("coefficients", table)
+        self._append("coefficients", springs)
         if strip.union is not None:
             row, partner = strip.union.rows, strip.union.partners
             self._rows.append((strip.ids, strip.union.mass_row))
@@ -368,27 +239,31 @@ class Batch:
 
     def _birth(self, strip: Strip, invalid: np.ndarray) -> np.ndarray:
         """Status of each robot before its first step, shape (n,)."""
-        refused = self._refused[strip.ids]
+        refused = self._grouping.refused[strip.ids]
         return np.select([invalid, refused], [Status.INVALID, Status.UNSTABLE_STEP], Status.OK)
 
     def _spring_tables(
         self, strip: Strip, width: int, order: np.ndarray | slice, actuated: bool
-    ) -> tuple[int, list[np.ndarray], np.ndarray]:
+    ) -> tuple[int, np.ndarray, np.ndarray]:
         """The coefficients of the springs, a few bundles at a time, which fit the cache.
 
         Returns:
-            How many a spring has; the pieces, lane by lane; and which robots they are not finite
+            How many a spring has; all of them, lane by lane; and which robots they are not finite
             for, shape (n,).
         """
         if strip.union is not None:
             table = coefficients(strip.fields, order, actuated)
             cast = table.astype(real_dtype(self._method.precision), copy=False)
             nothing = np.zeros(table.shape[1], cast.dtype)
-            pieces = [strip.union.lanes_of(cast, strip.counts, True, nothing)]
-            return table.shape[1], pieces, not_finite(cast, strip.counts)
+            lanes = strip.union.lanes_of(cast, strip.counts, True, nothing)
+            return table.shape[1], lanes, not_finite(cast, strip.counts)
         n, start = len(strip.ids), np.append(0, np.cumsum(strip.counts))
+        # Where each robot's lane ends; those of a bundle are of the same size.
+        ends = start if width == 1 else -(-np.arange(n + 1) // width) * width * start[1]
         bundles = max(1, PIECE // max(int(strip.counts.max()) * width, 1))
-        pieces, invalid = [], np.zeros(n, bool)
+        invalid = np.zeros(n, bool)
+        columns = traits_of(strip.elements).columns(actuated)
+        lanes = aligned_empty(columns * int(ends[-1]), real_dtype(self._method.precision))
         for first in range(0, n, bundles * width):
             last = min(first + bundles * width, n)
             part = slice(start[first], start[last])
@@ -399,8 +274,9 @@ class Batch:
             cast = table.astype(real_dtype(self._method.precision), copy=False)
             if strip.elements is NONE:  # limits may be infinite
                 invalid[first:last] = not_finite(cast, strip.counts[first:last])
-            pieces.append(lane_major(cast, last - first, width))
-        return table.shape[1], pieces, invalid
+            here = lanes[columns * ends[first] : columns * ends[last]]
+            lane_major(cast, last - first, width, here)
+        return columns, lanes, invalid
 
     def _pack_elements(
         self,
@@ -483,10 +359,7 @@ class Batch:
     def _finish(self) -> None:
         """Join the parts and look up where each robot went."""
         self.bundles = np.concatenate(self._tables)
-        self.arrays = {
-            name: aligned(parts, dtype_of(name, self._method.precision))
-            for name, parts in self._parts.items()
-        }
+        self.arrays = {name: self._joined(name, parts) for name, parts in self._parts.items()}
         self._parts.clear()
         bundle, lane, width = np.ascontiguousarray(self._slot.T)
         description = dict(zip(BUNDLE, self.bundles[bundle].T, strict=True))
@@ -512,24 +385,9 @@ class Batch:
             rows=rows,
         )
 
-
-def _wide_first(kind: Kind) -> tuple:
-    width, actuated, layout, traits = kind
-    return -width, layout, actuated, traits.name  # wide bundles first: alignment
-
-
-def _cohorts(robots: Sequence[Robot]) -> Iterator[Strip | int]:
-    """Robots of one topology and structure as one strip; a plain robot that shares them with none
-    by its index.
-    """
-    if isinstance(robots, Variants) and len(robots) > 1:
-        yield Strip.variants(robots)
-        return
-    alike: dict[tuple[bytes, bytes], list[int]] = defaultdict(list)
-    for index, robot in enumerate(robots):
-        alike[robot.topology, robot.elements.structure].append(index)
-    for members in alike.values():
-        if len(members) == 1 and robots[members[0]].elements is NONE:
-            yield members[0]
-        else:
-            yield Strip.alike(members, [robots[i] for i in members])
+    def _joined(self, name: str, parts: list[np.ndarray]) -> np.ndarray:
+        """The parts of a buffer in one array, aligned as vector loads need."""
+        # By far the largest was made to be the buffer itself, if there is one strip.
+        if name == "coefficients" and len(parts) == 1 and parts[0].ctypes.data % 64 == 0:
+            return parts[0]
+        return aligned(parts, dtype_of(name, self._method.precision))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Strip",
     "aligned",
+    "aligned_empty",
     "breathes",
     "coefficients",
     "fastest_actuation",
@@ -313,16 +314,23 @@ def not_finite(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return largest(rows.astype(float), counts) > 0.0
 
 
-def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:
+def lane_major(
+    values: np.ndarray, robots: int, width: int, out: np.ndarray | None = None
+) -> np.ndarray:
     """Flat values of ``robots`` equal robots with the lane as the innermost index.
 
-    The last robot fills the lanes that are left over in the last bundle.
+    The last robot fills the lanes that are left over in the last bundle. ``out`` is written, if
+    it is given.
     """
     if width == 1:
-        return values.ravel()
+        if out is None:
+            return values.ravel()
+        out[:] = values.ravel()
+        return out
     full, size = robots // width, values.size // robots
     rows, left = values.reshape(robots, size), robots % width
-    block = np.empty((full + (left > 0), size, width), values.dtype)
+    shape = full + (left > 0), size, width
+    block = np.empty(shape, values.dtype) if out is None else out.reshape(shape)
     block[:full] = rows[: full * width].reshape(full, width, size).transpose(0, 2, 1)
     if left:
         block[full, :, :left] = rows[full * width :].T
@@ -330,12 +338,16 @@ def lane_major(values: np.ndarray, robots: int, width: int) -> np.ndarray:
     return block.ravel()
 
 
-def aligned(parts: Sequence[np.ndarray], dtype: np.dtype) -> np.ndarray:
-    """The parts joined in one array that starts on a 64-byte boundary, as vector loads need."""
-    count = sum(part.size for part in parts)
+def aligned_empty(count: int, dtype: np.dtype) -> np.ndarray:
+    """So many numbers, to be written, from a 64-byte boundary on, as vector loads need."""
     buffer = np.empty(count * dtype.itemsize + 64, np.uint8)
     start = -buffer.ctypes.data % 64
-    array = buffer[start : start + count * dtype.itemsize].view(dtype)
+    return buffer[start : start + count * dtype.itemsize].view(dtype)
+
+
+def aligned(parts: Sequence[np.ndarray], dtype: np.dtype) -> np.ndarray:
+    """The parts joined in one array that starts on a 64-byte boundary, as vector loads need."""
+    array = aligned_empty(sum(part.size for part in parts), dtype)
     if parts:
         np.concatenate(parts, out=array, casting="same_kind")
     return array
