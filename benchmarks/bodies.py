@@ -1,6 +1,7 @@
 """Ragged generations: what it costs that every robot has a body of its own.
 
     python -m benchmarks.bodies packing      # built and stepped, all different against all alike
+    python -m benchmarks.bodies building     # from genomes to a packed batch, against stepping it
     python -m benchmarks.bodies genomes      # random genomes of every encoding, stepped 100 times
 
 Prints one JSON object a line.
@@ -82,6 +83,43 @@ def packing(options: argparse.Namespace) -> None:
     )
 
 
+def building(options: argparse.Namespace) -> None:
+    """Expressing and packing genomes of different bodies, against a second of the default run."""
+    cls = ENCODINGS["voxels"]
+    encoding = cls(None, cls.Settings(cells=(4, 4, 3)))
+    parts = []
+    for part in itertools.count():
+        genomes = encoding.random(2048, np.random.Generator(np.random.Philox([1, part])))
+        sizes = np.array([robot.n_springs for robot in encoding.express(genomes)])
+        near = np.abs(sizes - options.springs) <= 0.1 * options.springs
+        parts.append(encoding.take(genomes, np.flatnonzero(near)))
+        if sum(map(len, parts)) >= options.robots:
+            break
+    genomes = encoding.take(encoding.concatenate(parts), np.arange(options.robots))
+    found = []
+    for _ in range(options.repeats):
+        started = time.perf_counter()
+        robots = encoding.express(genomes)
+        expressed = time.perf_counter()
+        simulation = ws.Simulation(robots, SCENE)
+        found.append((expressed - started, time.perf_counter() - expressed))
+    express, pack = (float(np.median(seconds)) for seconds in zip(*found, strict=True))
+    simulation.run(DT)
+    result = simulation.run(options.duration)
+    stepping = result.wall_time / options.duration
+    _say(
+        what="building",
+        robots=len(robots),
+        topologies=len({robot.topology for robot in robots}),
+        springs_per_robot=float(np.mean([robot.n_springs for robot in robots])),
+        springs_per_s=result.spring_evaluations / result.wall_time,
+        express_s=express,
+        pack_s=pack,
+        stepping_1_s_takes_s=stepping,
+        building_share=(express + pack) / stepping,
+    )
+
+
 def _validate(robots: Sequence[ws.Robot]) -> None:
     """Robots in a ragged batch end where they end alone, to the bit."""
     together = ws.Simulation(robots, SCENE, dt=DT, precision="float32").run(0.05)
@@ -133,6 +171,7 @@ def _say(**row: object) -> None:
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "packing": packing,
+    "building": building,
     "genomes": genomes,
 }
 
