@@ -135,13 +135,12 @@ class Batch:
         self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
         self.groups: list[Group] = []
-        self.substeps = np.ones(len(robots), np.int64)
-        self.levels = np.zeros(len(robots), np.int64)
         self.rounding = np.zeros(len(robots))
         self.wearing: dict[int, tuple[np.ndarray, int]] = {}
         self._rows: list[tuple[np.ndarray, np.ndarray]] = []  # robots, and places of their masses
         self._slot = np.zeros((len(robots), 3), np.int64)  # bundle, lane, width
         self._grouping = Grouping(robots, scene, method, layout_of)
+        self.levels, self.substeps = self._grouping.levels, self._grouping.substeps
 
         # An absurd robot may overflow here; its status will say so.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -161,11 +160,8 @@ class Batch:
     def _pack(self, strip: Strip, width: int, actuated: bool) -> None:
         """Append a strip: its robots' places, its bundles' descriptions and its arrays."""
         n, method = len(strip.ids), self._method
-        levels = method.levels(strip, self._scene)
-        if not strip.shared or self._scene.collisions is not None:  # nobody asked before
-            self._grouping.refuse(strip, levels)
-        self.levels[strip.ids] = levels
-        self.substeps[strip.ids] = method.substeps(strip, self._scene, levels)
+        self._grouping.decide(strip)
+        levels = self.levels[strip.ids]
         within = np.arange(n)
         self._slot[strip.ids] = np.stack(
             [len(self) + within // width, within % width, np.full(n, width)], axis=1

@@ -134,7 +134,7 @@ def stable_step(strip: Strip, scene: Scene, integrator: str) -> np.ndarray:
 
 def _largest_frequency(strip: Strip) -> np.ndarray:
     """A bound of the largest angular frequency of the springs in any pose [rad/s], shape (n,)."""
-    fields, ends = strip.fields, _ends(strip)
+    fields, ends = strip.fields, strip.ends
     per_mass = np.zeros(len(fields["masses"]))
     stiffness = stiffest(fields)
     for end in ends:
@@ -215,20 +215,13 @@ def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndar
 def _sum_of_ends(strip: Strip, values: np.ndarray) -> np.ndarray:
     """What the two masses of each spring have together, from values of all masses, flat."""
     if not strip.shared:
-        start, end = _ends(strip)
+        start, end = strip.ends
         return values[start] + values[end]
     start, end = strip.springs.T
     rows = values.reshape(len(strip.ids), -1)
     if (rows == rows[0]).all():  # the controllers of one body
         return np.tile(rows[0, start] + rows[0, end], len(rows))
     return (rows[:, start] + rows[:, end]).ravel()
-
-
-def _ends(strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of all springs, counted over the masses of all robots."""
-    first = np.repeat(np.cumsum(strip.masses) - strip.masses, strip.counts)
-    start, end = strip.all_springs.T.astype(np.intp) + first
-    return start, end
 
 
 def _positive(values: np.ndarray) -> np.ndarray:

@@ -41,7 +41,9 @@ class Grouping:
         layout_of: The layout of a robot with so many masses.
 
     Attributes:
-        refused: Whose step is certainly unstable, as far as anybody asked, shape (N,) bool.
+        levels: Halvings of the step of the run for each robot, shape (N,), once they are decided.
+        substeps: Contact sub-steps of each robot, shape (N,), likewise.
+        refused: Whose step is certainly unstable, shape (N,) bool, likewise.
     """
 
     def __init__(
@@ -53,7 +55,10 @@ class Grouping:
     ) -> None:
         self._robots, self._scene, self._method = robots, scene, method
         self._layout_of = layout_of
+        self.levels = np.zeros(len(robots), np.int64)
+        self.substeps = np.ones(len(robots), np.int64)
         self.refused = np.zeros(len(robots), bool)
+        self._decided = np.zeros(len(robots), bool)
 
     def strips(self) -> dict[Kind, list[Strip]]:
         """The robots by kind, and by topology; wide bundles first: alignment."""
@@ -166,9 +171,9 @@ class Grouping:
         And alike in whether they are stepped at all: a bundle of the refused costs no time.
         """
         actuated = breathes(cohort)
-        levels = self._method.levels(cohort, self._scene)
-        substeps = self._method.substeps(cohort, self._scene, levels)
-        traits = np.stack([actuated, levels, substeps, self.refuse(cohort, levels)])
+        self.decide(cohort)
+        decided = (self.levels, self.substeps, self.refused)
+        traits = np.stack([actuated, *(values[cohort.ids] for values in decided)])
         if (traits == traits[:, :1]).all():  # as robots of one body mostly are
             yield bool(actuated[0]), np.arange(len(actuated))
             return
@@ -176,10 +181,15 @@ class Grouping:
         for index in range(kinds.shape[1]):
             yield bool(kinds[0, index]), np.flatnonzero(kind.ravel() == index)
 
-    def refuse(self, strip: Strip, levels: np.ndarray) -> np.ndarray:
-        """Look up which robots of a strip cannot be stepped so, shape (n,) bool."""
+    def decide(self, strip: Strip) -> None:
+        """Decide how the robots of a strip are stepped, unless that is known."""
+        if self._decided[strip.ids].all():
+            return
+        levels = self._method.levels(strip, self._scene)
+        self.levels[strip.ids] = levels
+        self.substeps[strip.ids] = self._method.substeps(strip, self._scene, levels)
         self.refused[strip.ids] = self._method.refused(strip, self._scene, levels)
-        return self.refused[strip.ids]
+        self._decided[strip.ids] = True
 
 
 def _wide_first(kind: Kind) -> tuple:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -131,6 +132,13 @@ class Strip:
         fields |= {name: self.fields[name][of_spring] for name in SPRING_FIELDS}
         fields["omega"] = self.fields["omega"][members]
         return Strip(self.ids[members], masses, counts, self.springs[of_spring], False, fields)
+
+    @functools.cached_property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of the springs of all robots, counted over the masses of all robots."""
+        first = np.repeat(np.cumsum(self.masses) - self.masses, self.counts)
+        springs = self.all_springs
+        return springs[:, 0] + first, springs[:, 1] + first
 
     @property
     def all_springs(self) -> np.ndarray:
