@@ -14,7 +14,7 @@ import numpy as np
 from warp_springs.engine.curve import ranges
 from warp_springs.engine.slots import Slots
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES
-from warp_springs.kernels.bundle import Features
+from warp_springs.kernels.features import Features
 from warp_springs.kernels.traits import PLAIN
 
 __all__ = ["Ranks"]
