@@ -44,7 +44,7 @@ from warp_springs.engine.packing import (
 )
 from warp_springs.engine.slots import Slots
 from warp_springs.kernels.buffers import BUNDLE, dtype_of, real_dtype
-from warp_springs.kernels.lanes import Features
+from warp_springs.kernels.features import Features
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
 from warp_springs.stability import Status

@@ -19,7 +19,7 @@ from warp_springs.engine.merging import unions
 from warp_springs.engine.method import Method
 from warp_springs.engine.packing import Strip, breathes
 from warp_springs.kernels.dialect import native_width
-from warp_springs.kernels.lanes import Features
+from warp_springs.kernels.features import Features
 from warp_springs.kernels.traits import MERGED, PLAIN, Traits
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
