@@ -27,6 +27,9 @@ __all__ = ["FITNESS", "UNITS", "Measure", "Trial", "body_diameters", "measure", 
 SAMPLES_PER_CYCLE = 20
 """How often a measure that needs the path sees the centre of mass."""
 
+LEAST_WALK = 0.01
+"""Speed [body diameters per cycle] up to which a robot stands still, as far as economy goes."""
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -71,6 +74,15 @@ class Trial:
     def work(self) -> np.ndarray:
         """Net work of the breathing springs during the measurement [J], shape (N,)."""
         return sum(piece.energy.work[:, -1] for piece in self.pieces)
+
+    @property
+    def given_up(self) -> np.ndarray:
+        """What a robot has less at the end of the measurement than at its start [J], shape (N,).
+
+        No less than its kinetic energy at the start: the momentum carries it on.
+        """
+        first, last = self.pieces[0].energy, self.pieces[-1].energy
+        return np.maximum(first.total[:, 0] - last.total[:, -1], first.kinetic[:, 0])
 
     @property
     def duration(self) -> float:
@@ -179,9 +191,14 @@ def jump(trial: Trial) -> np.ndarray:
 
 @measure("m/J", energy=True)
 def economy(trial: Trial) -> np.ndarray:
-    """Net distance for every joule that the springs worked."""
-    work = np.abs(trial.work)
-    return np.divide(distance(trial), work, out=np.zeros_like(work), where=work > 0.0)
+    """Net distance for every joule that the springs worked, or that the robot had and gave up.
+
+    Zero for who hardly moves: muscles that breathe by a nanometre spend next to nothing, and any
+    rounding of the way would make them champions; and who falls over pays with the fall.
+    """
+    way, work = distance(trial), np.abs(trial.work)
+    walks = (_per_diameter_and_cycle(way, trial) > LEAST_WALK) & (work > 0.0)
+    return np.divide(way, work + trial.given_up, out=np.zeros_like(way), where=walks)
 
 
 @measure("J", energy=True)
