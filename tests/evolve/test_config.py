@@ -63,7 +63,8 @@ def test_every_optimizer_can_be_chosen_by_its_name(name):
 @pytest.mark.parametrize("name", ENCODINGS)
 def test_every_encoding_can_be_chosen_by_its_name(name):
     preset = "cube" if ENCODINGS[name].needs_body else "critter"
-    assert isinstance(load(preset, {"encoding.type": name}).make_encoding(), ENCODINGS[name])
+    settings = {"encoding.type": name, "task.goals": [[1.0, 0.0, 0.5]]}  # some sense a light
+    assert isinstance(load(preset, settings).make_encoding(), ENCODINGS[name])
 
 
 SHAPES = [
