@@ -108,8 +108,10 @@ class GrowingBody(CellGenes):
         coins = rng.random((len(a), groups[-1] + 1)) < 0.5
         return np.where(coins[:, groups], b, a)
 
-    def grown(self, genome: np.ndarray, light: Light, behind: float = -np.inf) -> Cells:
-        """The cells of one genome's body, grown in some light, not far `behind` its first cell."""
+    def grown(
+        self, genome: np.ndarray, light: Light, material: float, behind: float = -np.inf
+    ) -> Cells:
+        """The cells of one genome's body: see `grow`, and `Cells` for how far `behind`."""
         genes = np.asarray(genome, np.float64)
         first = tissue(genes[self._sizes[-1] :][:TISSUE])
         rule = self._rule(genes)
@@ -160,7 +162,8 @@ class GrowthEncoding(GrowingBody):
 
     def body(self, genome: np.ndarray) -> Cells:
         """The cells of one genome's body."""
-        return self.grown(genome, Light(self.settings.lamp, self.settings.far))
+        settings = self.settings
+        return self.grown(genome, Light(settings.lamp, settings.far), settings.material)
 
     def express(self, genomes: np.ndarray) -> list[ws.Robot]:
         """Build the robots."""

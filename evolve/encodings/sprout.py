@@ -86,7 +86,7 @@ class SproutEncoding(GrowingBody):
     def body(self, genome: np.ndarray) -> Cells:
         """The cells of one genome's plan, heading along x."""
         overhead = Light((1.0, 0.0, 0.0), self.settings.far)
-        return self.grown(genome, overhead, behind=-1e-9)
+        return self.grown(genome, overhead, material=np.inf, behind=-1e-9)
 
     def express(self, genomes: np.ndarray) -> list[ws.Robot]:
         """Build the seedlings."""
