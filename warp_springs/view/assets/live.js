@@ -3,7 +3,9 @@
 const $ = (name) => document.getElementById(name);
 const plot = new Plot("curve", null);
 const PAUSE = 8000;  // milliseconds that a page of robots stays at least
-let shown = 0, changed = 0, failures = 0;
+const PATIENCE = 6000;  // milliseconds after which a page is shown that does not say it has drawn
+const SETTLING = 1500;
+let shown = 0, changed = 0, failures = 0, coming = null;
 
 function show(state) {
   const words = state.facts.map(([name, value]) => `<div><dt>${escaped(name)}</dt><dd>${escaped(value)}</dd></div>`);
@@ -15,7 +17,7 @@ function show(state) {
   const lines = curve.lines.map((line) => ({ ...line, kind: "line", values: line.values.map((v) => (v === null ? NaN : v)) }));
   if (curve.x.length > 1) plot.show(curve.title, curve.unit, curve.x, lines, `against ${curve.xName}`, "");
   plot.draw(null);
-  const due = !shown || state.done >= 1 || performance.now() - changed > PAUSE;
+  const due = !coming && (!shown || state.done >= 1 || performance.now() - changed > PAUSE);
   if (state.page > shown && due && ($("fresh").checked || !shown)) bring(state.page);
 }
 
@@ -28,13 +30,25 @@ function bring(version) {
   frame.title = "The robots";
   frame.className = "coming";
   frame.src = `robots?${version}`;
-  frame.onload = () => setTimeout(() => {
-    $("waiting").hidden = true;
-    for (const old of $("robots").querySelectorAll("iframe")) if (old !== frame) old.remove();
-    frame.className = "";
-  }, 700);
+  frame.onload = () => setTimeout(() => reveal(frame), PATIENCE);
+  coming = frame;
   $("robots").append(frame);
 }
+
+// What was seen before stays below until a slow machine has put the new page onto the screen.
+function reveal(frame) {
+  if (frame !== coming || !frame.className) return;
+  frame.className = "";
+  setTimeout(() => {
+    $("waiting").hidden = true;
+    for (const old of $("robots").querySelectorAll("iframe")) if (old !== frame) old.remove();
+    coming = null;
+  }, SETTLING);
+}
+
+window.addEventListener("message", ({ source, data }) => {
+  if (data === "drawn" && coming && source === coming.contentWindow) reveal(coming);
+});
 
 async function ask() {
   try {

@@ -5,7 +5,8 @@ const SUN_SPREAD = 0.07;
 
 class Painter {
   constructor(canvas, scene) {
-    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
+    // Not opaque: until a slow machine has drawn, the sky behind is seen instead of black.
+    const gl = canvas.getContext("webgl2", { antialias: true });
     if (!gl) throw new Error("This browser offers no WebGL 2, which the picture needs.");
     Object.assign(this, { gl, canvas, scene, sharpness: 1 });
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);

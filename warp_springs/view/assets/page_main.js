@@ -276,13 +276,15 @@ class Show {
     this.goAlong();
     const look = { color: $("color").value, skin: $("skin").checked };
     this.painter.draw(this.camera, moment, look, this.shownBox(moment), this.signs(moment));
-    $("stage").classList.add("drawn");
     $("time").value = this.time;
     $("clock").textContent = (this.scene.times[0] + this.time).toFixed(2) + " s";
     const share = this.duration ? this.time / this.duration : 0;
     this.upper.draw(share);
     this.lower.draw(share);
     this.placeLabels(moment);
+    if ($("stage").classList.contains("drawn")) return;
+    $("stage").classList.add("drawn");
+    if (parent !== window) parent.postMessage("drawn", "*");  // who waited with showing the frame
   }
 
   // Where mass `i` of a robot is.

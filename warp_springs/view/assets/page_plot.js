@@ -118,7 +118,7 @@ function ticks(low, high, count) {
 
 function short(v) {
   if (v === 0) return "0";
-  if (Math.abs(v) >= 1e4 && Math.abs(v) < 1e7) return v.toLocaleString("en");
+  if (Math.abs(v) >= 1e3 && Math.abs(v) < 1e7) return v.toLocaleString("en");
   return Math.abs(v) >= 1e7 || Math.abs(v) < 1e-3 ? v.toExponential(0) : String(Number(v.toPrecision(3)));
 }
 
