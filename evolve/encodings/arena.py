@@ -207,6 +207,13 @@ class ArenaEncoding:
             self.hills.concatenate([part.hills for part in parts]),
         )
 
+    def overwrite(
+        self, genomes: Meetings, rows: np.ndarray, others: Meetings, whence: np.ndarray
+    ) -> None:
+        """Put others[whence[i]] in place of genomes[rows[i]]."""
+        self.robots.overwrite(genomes.robots, rows, others.robots, whence)
+        self.hills.overwrite(genomes.hills, rows, others.hills, whence)
+
     def worlds(self, genomes: Meetings, scene: ws.Scene) -> Iterator[tuple[np.ndarray, ws.Scene]]:
         """Which of the robots live in which world: the scene with their hills."""
         kinds, kind = np.unique(genomes.hills, axis=0, return_inverse=True)

@@ -97,10 +97,10 @@ class Learning(Optimizer):
 
     def _tuned(self, genomes: Genomes, which: np.ndarray) -> Genomes:
         """The genomes, some of them, (n,) bool, with other controllers."""
-        n = len(which)
         others = self.encoding.tune(genomes, self.streams(self.turn, Role.MUTATION, 2))
-        pool = self.encoding.concatenate([genomes, others])
-        return self.encoding.take(pool, np.arange(n) + n * which)
+        rows = np.flatnonzero(~which)
+        self.encoding.overwrite(others, rows, genomes, rows)
+        return others
 
     def _tell(self, individuals: Individuals) -> None:
         pupils = self._pupils
@@ -112,7 +112,7 @@ class Learning(Optimizer):
         found = self._take(individuals, best)
         if pupils is not None:
             better = np.arange(count) + count * (found.scores.worth > pupils.scores.worth)
-            found = self._take(self._concatenate(pupils, found), better)
+            found = self._take(self._joined(pupils, found), better)
         self._pupils, self._lesson = found, self._lesson + 1
         if self._lesson == self.settings.lessons:
             self._graduate()

@@ -67,7 +67,7 @@ class Novelty(Breeder):
     def _tell(self, individuals: Individuals) -> None:
         pool = individuals
         if self._survivors is not None:
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         novelty = self.novelty(pool)
         young = novelty[-len(individuals) :]
         healthy = int(np.isfinite(young).sum())

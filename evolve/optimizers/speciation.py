@@ -79,7 +79,7 @@ class Speciation(Breeder):
     def _tell(self, individuals: Individuals) -> None:
         pool, n = individuals, len(individuals)
         if self._survivors is not None:
-            pool = self._concatenate(self._survivors, individuals)
+            pool = self._joined(self._survivors, individuals)
         species, count = self._sorted_into_species(pool)
         worth = pool.scores.worth
         bests = np.full(count, -np.inf)
@@ -124,8 +124,8 @@ class Speciation(Breeder):
 
     def _near(self, pool: Individuals, head: int, others: np.ndarray) -> np.ndarray:
         """Which of some places in the pool are within the radius of one, (k,) bool."""
-        genomes = self.encoding.take(pool.genomes, others)
-        same = self.encoding.take(pool.genomes, np.full(len(others), head))
+        genomes = self._take(pool, others).genomes
+        same = self._take(pool, np.full(len(others), head)).genomes
         return (self.encoding.distance(same, genomes) <= self.radius) | (others == head)
 
     def _shared_fitness(self, worth: np.ndarray, species: np.ndarray, count: int) -> np.ndarray:

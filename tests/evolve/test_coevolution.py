@@ -158,3 +158,12 @@ def test_bodies_evolve_against_hills():
     assert len(worths[0]) == 8 and len(worths[1]) == 4
     look = looked_at_again(Evaluator(search.config), encoding, genomes, generation.scores.fitness)
     assert np.isfinite(look.halved).any()
+
+
+def test_any_optimizer_searches_robots_together_with_hills():
+    """Not coevolution: hills that are easy are fine, too; but nothing may stumble over pairs."""
+    for optimizer in ("genetic", "hill_climber", "learning", "speciation"):
+        search = Search(load("critter", BODIES | {"optimizer": {"type": optimizer}}))
+        while not search.finished:
+            search.step()
+        assert search.optimizer.best_fitness > 0.0

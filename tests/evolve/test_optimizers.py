@@ -315,7 +315,11 @@ def test_what_cannot_be_an_objective_is_named():
 def test_map_elites_keeps_the_best_of_every_cell():
     optimizer = make("map_elites")
     everybody = solve(optimizer, 12)
-    pool = optimizer._concatenate(*everybody)
+    pool = Individuals(
+        np.concatenate([part.ids for part in everybody]),
+        np.concatenate([part.genomes for part in everybody]),
+        Scores.concatenate([part.scores for part in everybody]),
+    )
     cells, worth = np.full(len(pool), -1), pool.scores.worth
     good = np.isfinite(worth)
     cells[good] = optimizer.cells(optimizer._take(pool, np.flatnonzero(good)))
