@@ -76,7 +76,9 @@ def test_robots_off_the_lattice_or_with_obstacles_stay_alone():
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32", "mixed"])
-@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 2, 1), (3, 2, 2), (4, 3, 2), (5, 4, 4)])
+@pytest.mark.parametrize(
+    "cells", [(1, 1, 1), (3, 2, 2), (3, 3, 3), (4, 3, 3), (5, 4, 3), (5, 4, 4)]
+)
 def test_a_lone_robot_has_the_bits_of_a_bundle_whatever_its_size(precision, cells):
     """Masses as lanes, one to many registers of them, or quads, or a robot in each lane."""
     body = ws.shapes.lattice(*cells)

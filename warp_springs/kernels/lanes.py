@@ -9,6 +9,10 @@ subtracts it from the partners, which all come later; so when row i ends mass i 
 no later row reads its position, and it is moved at once. Two rows go together, since neighbours
 share partners.
 
+Robots of different topologies may share a bundle of their union (see ``engine.merging``): where a
+lane lacks a mass or a spring, its inverse mass or its stiffness is zero. A lone robot has
+its own masses and springs in the lanes (see ``strands`` and ``permuted``).
+
 Every bundle is described by one row of the table ``BUNDLE``: where its blocks start in the flat
 buffers, how large they are. So one launch runs bundles of any topologies, and a robot's arithmetic
 depends neither on its lane nor on its neighbours.

@@ -15,9 +15,8 @@ __all__ = ["PERMUTED", "permutation", "permuted_scratch"]
 
 #: Bytes of the registers that are permuted, and registers that one permutation looks into.
 REGISTER, AT_ONCE = 64, 2
-#: The most masses that fit: so many permutations of each coordinate find a partner in less time
-#: than quads of memory, measured.
-MOST_MASSES = {"float32": 256, "float64": 96}
+#: The most masses that fit: as many as lie in eight registers for each coordinate.
+MOST_MASSES = {"float32": 128, "float64": 64}
 
 
 def permuted_scratch(masses: int, springs: int, width: int, surfaces: int) -> int:
@@ -194,11 +193,11 @@ auto step_permuted = [&]() {
     struct Two { enum { most = 1 }; };
     struct Four { enum { most = 2 }; };
     struct Six { enum { most = 3 }; };
-    struct All { enum { most = MOST_MASSES ? (MOST_MASSES / W + 1) / 2 : 1 }; };
+    struct Eight { enum { most = 4 }; };
     if (R <= 2) permuted_forces(where, Two());
     else if (R <= 4) permuted_forces(where, Four());
     else if (R <= 6) permuted_forces(where, Six());
-    else permuted_forces(where, All());
+    else permuted_forces(where, Eight());
     for (int r = 0; r < R; ++r)
         move_row(PF[r], PX, low_PX, PV, low_PV, shifted_PX, r, PW[r],
                  row_left + (OBSTACLES ? OBSTACLES : 1) * r);
