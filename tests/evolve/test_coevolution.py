@@ -163,7 +163,9 @@ def test_bodies_evolve_against_hills():
 def test_any_optimizer_searches_robots_together_with_hills():
     """Not coevolution: hills that are easy are fine, too; but nothing may stumble over pairs."""
     for optimizer in ("genetic", "hill_climber", "learning", "speciation"):
-        search = Search(load("critter", BODIES | {"optimizer": {"type": optimizer}}))
+        search = Search(
+            load("critter", BODIES | {"optimizer": {"type": optimizer}, "generations": 2})
+        )
         while not search.finished:
             search.step()
         assert search.optimizer.best_fitness > 0.0
