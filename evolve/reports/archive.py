@@ -65,11 +65,12 @@ def niches(config: RunConfig) -> tuple[str, ...]:
 
 
 def atlas(run: Run, store: Store) -> Atlas | None:
-    """The atlas of a run over the first two of its `niches`; None where it has none, or nobody.
+    """The atlas of a run over two of its `niches`; None where it has none, or nobody.
 
-    Over the grid of MAP-Elites where the optimizer is that; else over what was found.
+    Over the grid of MAP-Elites, its first two descriptors, where the optimizer is that; else over
+    what was found, the first descriptor and the one that goes along with it least.
     """
-    names = niches(run.config)[:2]
+    names = niches(run.config)
     record = store.record()
     ids = record.ids[np.isfinite(record.fitness)]
     if not names or not len(ids):
@@ -80,6 +81,10 @@ def atlas(run: Run, store: Store) -> Atlas | None:
     fitness = record.fitness[np.isfinite(record.fitness)][good]
     if not len(ids):
         return None
+    two = [0, 1][: len(names)]
+    if len(names) > 2 and not isinstance(run.config.optimizer, MapElitesSettings):
+        two[1] = _least_alike(found)
+    names, found = tuple(names[place] for place in two), found[:, two]
     edges = _edges(run.config, names, found)
     places = [
         np.clip(np.searchsorted(edge, column, side="right") - 1, 0, len(edge) - 2)
@@ -95,6 +100,15 @@ def atlas(run: Run, store: Store) -> Atlas | None:
     where = tuple(place[order] for place in places)
     best[where], worth[where] = ids[order], fitness[order]
     return Atlas((names[0], names[1]), (edges[0], edges[1]), best, worth)
+
+
+def _least_alike(found: np.ndarray) -> int:
+    """Which column of a table (n, D) but the first is least correlated with the first."""
+    scaled = found - found.mean(axis=0)
+    spread = np.sqrt((scaled**2).sum(axis=0))
+    alike = np.abs(scaled[:, 0] @ scaled) / np.maximum(spread[0] * spread, 1e-300)
+    # What is the same for everybody tells nobody apart.
+    return 1 + int(np.where(spread > 0.0, alike, np.inf)[1:].argmin())
 
 
 def _edges(config: RunConfig, names: Sequence[str], found: np.ndarray) -> list[np.ndarray]:
