@@ -67,9 +67,10 @@ def assert_all_finite(stage):
 # -- a well-formed stage -----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("geometry", ["skel", "points", "mesh"])
 @pytest.mark.parametrize("suffix", [".usdc", ".usda", ".usdz", ".USDA"])
-def test_every_format_passes_all_validators(result, tmp_path, suffix):
-    path = ws.export_usd(result, tmp_path / f"robots{suffix}")
+def test_every_format_passes_all_validators(result, tmp_path, suffix, geometry):
+    path = ws.export_usd(result, tmp_path / f"robots{suffix}", geometry=geometry)
     assert path == tmp_path / f"robots{suffix}"
     assert validation_errors(path) == []
     assert len(robots_of(Usd.Stage.Open(str(path)))) == 2

@@ -5,8 +5,7 @@ const SUN_SPREAD = 0.07;
 
 class Painter {
   constructor(canvas, scene) {
-    // Not opaque: until a slow machine has drawn, the sky behind is seen instead of black.
-    const gl = canvas.getContext("webgl2", { antialias: true });
+    const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
     if (!gl) throw new Error("This browser offers no WebGL 2, which the picture needs.");
     Object.assign(this, { gl, canvas, scene, sharpness: 1 });
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
@@ -168,6 +167,15 @@ class Painter {
     if (type === gl.INT) gl.vertexAttribIPointer(place, parts, type, 0, 0);
     else gl.vertexAttribPointer(place, parts, type, type === gl.UNSIGNED_BYTE, 0, 0);
     gl.vertexAttribDivisor(place, every);
+  }
+
+  // Whether the first picture that was asked for is complete.
+  finished() {
+    const { gl } = this;
+    if (this.fence) return gl.getSyncParameter(this.fence, gl.SYNC_STATUS) === gl.SIGNALED;
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    return false;
   }
 
   // `moment`: {a, b, blend} two frames and the way between them; `look`: {color, skin}.

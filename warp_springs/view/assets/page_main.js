@@ -282,7 +282,12 @@ class Show {
     this.upper.draw(share);
     this.lower.draw(share);
     this.placeLabels(moment);
-    if ($("stage").classList.contains("drawn")) return;
+    if (!$("stage").classList.contains("drawn")) this.unveil();
+  }
+
+  // The sky is seen until the first picture is complete, which takes long without a GPU.
+  unveil() {
+    if (!this.painter.finished()) return this.wake();
     $("stage").classList.add("drawn");
     if (parent !== window) parent.postMessage("drawn", "*");  // who waited with showing the frame
   }

@@ -127,5 +127,4 @@ def _plots(report: Document, result: Result, robot: int, name: str) -> None:
             called = {"name": name} if plot == "speed" else {}
             getattr(plots, plot)(page.subplots(), result, robot, **called)
             drawn.append(report.plot(page, caption))
-    for first in range(0, len(drawn), 2):
-        report.row(*drawn[first : first + 2])
+    report.row(*drawn)
