@@ -291,7 +291,7 @@ def test_a_jaw_that_closes_holds_what_its_friction_can_carry():
         scene = ws.Scene(ground=None, collisions=rough)
         fall = ws.Simulation(grasp, scene, dt=2e-4).run(0.15, fps=100).frames(0)
         ways[share] = (fall - fall[0])[:, :8, 2].mean(axis=1)
-    assert np.abs(ways[0.8]).max() < 1e-4
+    assert np.abs(ways[0.8]).max() < 3e-4  # it gives; at a hundredth of g it would slip 1 mm
     expected = -0.5 * (g - 2 * mu * force / mass) * 0.15**2
     assert ways[2.0][-1] == pytest.approx(expected, rel=0.02)
 
