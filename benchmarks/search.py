@@ -1,6 +1,6 @@
 """How much better than random search? Optimizers x encodings, the same evaluations each.
 
-    python benchmarks/search.py                          # three bodies, five seeds, 20 minutes
+    python benchmarks/search.py                          # three bodies, five seeds, 61,440 tries
     python benchmarks/search.py --generations 60         # a smaller budget
     python benchmarks/search.py --presets cube --json search.json
     python benchmarks/search.py --optimizers all --encodings all --presets walker --seeds 1 2
