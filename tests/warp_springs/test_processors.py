@@ -20,11 +20,11 @@ CHILD = """
 import json, sys
 import warp as wp
 import warp_springs as ws
-from warp_springs.kernels import lanes
+from warp_springs.kernels import dialect
 
 flags, size, cache, precision = json.loads(sys.argv[1])
 wp.config.kernel_cache_dir = cache
-lanes.COMPILER_OPTIONS["cpu_compiler_flags"] = flags
+dialect.PROCESSOR_OPTIONS["cpu_compiler_flags"] = flags
 for name, module in list(sys.modules.items()):
     if name.startswith("warp_springs.") and hasattr(module, "native_width"):
         module.native_width = lambda p: max(1, size // (8 if p == "float64" else 4))
