@@ -111,6 +111,7 @@ class Simulation:
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
+        self._gained = np.full(len(self.robots), np.nan)  # when energy from nowhere was seen [s]
         self._underway: tuple | None = None
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
@@ -281,14 +282,20 @@ class Simulation:
             found[robot] = np.stack([broken[place], worn[flow_places(place, lane)]])
         return found
 
-    def _find_gains(self, energy: Energy, times, status, stopped_at) -> None:
-        """Mark healthy robots that gained energy from nowhere, with the time it was first seen."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            seen = energy.gain > self.limits.gain
-            seen &= energy.residual > self._batch.rounding[:, None]
-        found = (status == Status.OK) & seen.any(axis=1)
-        status[found] = Status.ENERGY
-        stopped_at[found] = times[np.argmax(seen[found], axis=1)]
+    def _find_gains(self, energy: Energy | None, times, status, stopped_at) -> None:
+        """Mark healthy robots that gained energy from nowhere, with the time it was first seen.
+
+        Who did so in an earlier run is marked ever after: no later piece of a trial is honest.
+        """
+        if energy is not None:
+            with np.errstate(over="ignore", invalid="ignore"):
+                seen = energy.gain > self.limits.gain
+                seen &= energy.residual > self._batch.rounding[:, None]
+            found = np.isnan(self._gained) & (status == Status.OK) & seen.any(axis=1)
+            self._gained[found] = times[np.argmax(seen[found], axis=1)]
+        marked = (status == Status.OK) & ~np.isnan(self._gained)
+        status[marked] = Status.ENERGY
+        stopped_at[marked] = self._gained[marked]
 
     def _result(self, first, frame_steps, recorded, tapes, wall_time: float) -> Result:
         slots, buffers = self._batch.slots, self._buffers
@@ -301,8 +308,7 @@ class Simulation:
         until = np.where(status == 0, self.time, np.clip(stopped_at, first * self.dt, self.time))
         steps = np.rint((until - first * self.dt) / self.robot_dt).astype(np.int64)
         times = np.array(frame_steps, np.float64) * self.dt
-        if energy is not None:
-            self._find_gains(energy, times, status, stopped_at)
+        self._find_gains(energy, times, status, stopped_at)
         return Result(
             robots=self.robots,
             scene=self.scene,

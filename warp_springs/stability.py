@@ -49,7 +49,8 @@ class Status(enum.IntEnum):
     TOO_DEEP = 4
     #: The step is certain to be unstable for the robot's springs; it was never stepped.
     UNSTABLE_STEP = 5
-    #: It gained energy from nowhere, more than ``Limits.gain``; only seen with ``energy=True``.
+    #: It gained energy from nowhere, more than ``Limits.gain``; only seen with ``energy=True``. It
+    #: is found when a run is over: marked from then on, also in later runs, but not frozen.
     ENERGY = 6
     #: A number of the robot does not exist in the precision of the run; it was never stepped.
     INVALID = 7

@@ -169,6 +169,31 @@ def test_reason(name, reasons):
     assert np.isnan(result.status_time[slot]) == (reasons == {"OK"})
 
 
+def test_what_makes_energy_from_nowhere_is_stopped_where_energies_are_asked_for():
+    # One sub-step a drift is too coarse for the ground: every bounce pumps the cube up.
+    ice = ws.Scene(ground=ws.Ground(static_friction=0.0, kinetic_friction=0.0))
+    bouncing = cube().rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moved((0, 0, 0.3))
+    robots = [bouncing, cube().moved((0, 0, 50.0))]  # one bounces, the other falls
+    coarse = {"dt": 1.8e-3, "integrator": "leapfrog", "contact_substeps": 1}
+    simulation = ws.Simulation(robots, ice, **coarse)
+    result = simulation.run(3.0, fps=20, energy=True)
+    assert list(result.status) == [ws.Status.ENERGY, ws.Status.OK]
+    assert 0.2 < result.status_time[0] < 3.0
+    assert result.energy.gain[0].max() > ws.Limits().gain > result.energy.gain[1].max()
+    later = simulation.run(0.1)  # also where nobody looks at energies any more
+    assert list(later.status) == [ws.Status.ENERGY, ws.Status.OK]
+    assert later.status_time[0] == result.status_time[0]
+    honest = ws.Simulation(robots, ice, dt=1e-3).run(3.0, fps=20, energy=True)
+    assert not honest.status.any() and honest.energy.gain.max() < 1e-2
+
+
+def test_what_is_no_number_any_more_is_stopped_as_such():
+    huge = cube().scaled(1e200)  # the square of a length is infinite
+    result = ws.Simulation([huge, cube()], ws.Scene(ground=None), dt=1e-3).run(0.1)
+    assert list(result.status) == [ws.Status.NONFINITE, ws.Status.OK]
+    assert result.positions(0).tobytes() == huge.positions.tobytes()
+
+
 def test_status_is_an_integer_array_of_a_truthy_enum():
     _, result = crowd("float64", "leapfrog")
     assert result.status.dtype.kind == "i"
