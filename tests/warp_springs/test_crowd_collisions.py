@@ -12,7 +12,9 @@ from warp_springs.engine import crowd
 from warp_springs.kernels import crowd_collisions
 from warp_springs.kernels.block import block
 from warp_springs.kernels.flat_launches import launches
+from warp_springs.kernels.flat_threads import threads
 from warp_springs.kernels.gather import SLICE, GatherFeatures
+from warp_springs.kernels.look import look
 from warp_springs.kernels.traits import Traits
 
 KINDS = {"flat": crowd.Threads, "launches": crowd.Launches, "block": crowd.Blocks}
@@ -76,10 +78,10 @@ def test_lists_that_do_not_fit_change_no_bit(kinds, monkeypatch):
     assert text != crowd_collisions.CROWD_COLLIDING
     monkeypatch.setattr("warp_springs.kernels.gather.CROWD_COLLIDING", text)
     monkeypatch.setattr(GatherFeatures, "name", property(lambda self: f"no_room_{self.layout}"))
-    for cached in (launches, crowd.threads, crowd.look):
+    for cached in (launches, threads, look):
         cached.cache_clear()
     walked = run(stack(), layout)
-    for cached in (launches, crowd.threads, crowd.look):
+    for cached in (launches, threads, look):
         cached.cache_clear()
     assert np.array_equal(walked.frames(0), alone.frames(0))
 
