@@ -176,23 +176,23 @@ def _rest(console: Console, args: argparse.Namespace, broken: list[str]) -> list
 
 
 def _limits(console: Console, args: argparse.Namespace, broken: list[str]) -> dict:
-    """Measured limits over the bound: world -> integrator -> shape -> ratio."""
+    """Measured limits over the bound: world -> shape -> integrator -> ratio."""
     worlds, shapes = args.limits or list(stability_limits.WORLDS)[:-1], stability_limits.SHAPES
-    table = Table("world", "integrator", *shapes)
-    report, integrators = {}, stability_limits.INTEGRATORS
+    integrators = stability_limits.INTEGRATORS
+    table, report = Table("world", "shape", *integrators), {}
     with _bar(console, "limits") as progress:
-        for done, (world, integrator) in enumerate(itertools.product(worlds, integrators), 1):
-            found = {s: stability_limits.measure(s, world, integrator) for s in shapes}
-            report.setdefault(world, {})[integrator] = {
-                shape: ratio if math.isfinite(ratio) else None for shape, ratio in found.items()
+        for done, (world, shape) in enumerate(itertools.product(worlds, shapes), 1):
+            found = {i: stability_limits.measure(shape, world, i) for i in integrators}
+            report.setdefault(world, {})[shape] = {
+                i: ratio if math.isfinite(ratio) else None for i, ratio in found.items()
             }
-            table.add_row(world, integrator, *(f"{r:.2f}" for r in found.values()))
+            table.add_row(world, shape, *(f"{ratio:.2f}" for ratio in found.values()))
             broken += [
                 f"{shape}, {world}, {integrator}: unstable at {ratio:.2f} times ws.stable_dt"
-                for shape, ratio in found.items()
+                for integrator, ratio in found.items()
                 if ratio < 1.0
             ]
-            progress(done / len(worlds) / len(integrators))
+            progress(done / len(worlds) / len(shapes))
     console.print("smallest unstable step over ws.stable_dt; inf: none up to 2.9 times the bound")
     console.print(table)
     return report
