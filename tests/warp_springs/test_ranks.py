@@ -48,3 +48,30 @@ def test_those_who_go_on_fill_as_few_bundles_as_they_can(precision, monkeypatch)
             assert (together.center_of_mass[i] == apart.center_of_mass[0]).all()
         assert (first.energy.residual[i] == one.energy.residual[0]).all()
         assert (first.energy.work[i] == one.energy.work[0]).all()
+
+
+def test_robots_of_several_topologies_close_their_ranks_at_once(monkeypatch):
+    from warp_springs.engine.slices import Slice
+
+    monkeypatch.setattr(Slice, "launch_work", 1.0)
+    width = native_width("float64")
+    cubes = some_wild(6 * width)
+    reduced = [
+        cube.replace(
+            springs=cube.springs[1:],
+            **{
+                name: getattr(cube, name)[1:]
+                for name in ("stiffness", "rest_length", "amplitude", "phase")
+            },
+        )
+        for cube in cubes[: 3 * width]
+    ]
+    robots, options = cubes + reduced, {"dt": 1e-3, "precision": "float64", "threads": 1}
+    sim = ws.Simulation(robots, SCENE, **options)
+    end = sim.run(0.1)
+    good = np.flatnonzero(end.status == ws.Status.OK)
+    assert len(good) == 3 * width
+    assert len(np.unique(sim._batch.slots.bundle[good])) == 3
+    for i in good[:: width // 2]:
+        alone = ws.Simulation(robots[i], SCENE, **options).run(0.1)
+        assert (end.positions(i) == alone.positions(0)).all()

@@ -73,7 +73,7 @@ class Ranks:
         moves = list(self._moves(~stopped & (owner >= 0)))
         if not moves:
             return False
-        here, there = np.concatenate(moves, axis=1)
+        here, there = np.concatenate(moves, axis=2)
         self._exchange(here, there)
         for (bundle, lane), robots in ((there, owner[tuple(here)]), (here, owner[tuple(there)])):
             somebody = robots >= 0

@@ -62,12 +62,13 @@ auto nearest_on_triangle = [=](Point p, const Point* corner, scalar* weights) {
         }
     }
 };
+// Squared sine below which rounding decides where parallel segments meet: in the middle, then.
+const scalar PARALLEL = scalar(sizeof(scalar) == 4 ? 1e-6 : 1e-12);
 auto nearest_of_segments = [=](const Point* a, const Point* b, scalar* wa, scalar* wb) {
     const Point u = minus(a[1], a[0]), v = minus(b[1], b[0]), r = minus(a[0], b[0]);
     const scalar uu = inner(u, u), vv = inner(v, v), uv = inner(u, v);
     const scalar ur = inner(u, r), vr = inner(v, r), det = uu * vv - uv * uv;
-    scalar s = det > uu * vv * scalar(1e-12) ? within_unit((uv * vr - vv * ur) / det)
-                                            : scalar(0.5);
+    scalar s = det > uu * vv * PARALLEL ? within_unit((uv * vr - vv * ur) / det) : scalar(0.5);
     scalar t = vv > scalar(0) ? within_unit((uv * s + vr) / vv) : scalar(0);
     s = uu > scalar(0) ? within_unit((uv * t - ur) / uu) : scalar(0);
     wa[0] = scalar(1) - s; wa[1] = s;
