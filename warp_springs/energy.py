@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Energy"]
+__all__ = ["Balance", "Energy"]
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,39 @@ class Energy:
         it lost since, and the work of its springs, of pushes and of the wind. 0.1 is a coarse
         step, 1 an explosion.
         """
-        held = self.kinetic[:, :1] + self.spring[:, :1] + self.ground[:, :1]
-        fall = self.gravity[:, :1] - np.minimum.accumulate(self.gravity, axis=1)
-        works = np.abs(self.work) + np.abs(self.outer_work) + np.maximum(-self.drag_loss, 0.0)
-        given = held + fall + np.maximum.accumulate(works, axis=1)
-        return np.maximum(self.residual, 0.0) / np.maximum(given, np.finfo(float).tiny)
+        lowest = np.minimum.accumulate(self.gravity, axis=1)
+        return _gain(self, lowest, np.maximum.accumulate(self._works, axis=1))
+
+    @property
+    def _works(self) -> np.ndarray:
+        """Work of springs, pushes and wind, whichever way it went, shape (N, F)."""
+        return np.abs(self.work) + np.abs(self.outer_work) + np.maximum(-self.drag_loss, 0.0)
+
+
+def _gain(energy: Energy, lowest: np.ndarray, works: np.ndarray) -> np.ndarray:
+    """`Energy.gain`, from the least energy of height and the most work up to each frame."""
+    held = energy.kinetic[:, :1] + energy.spring[:, :1] + energy.ground[:, :1]
+    given = held + energy.gravity[:, :1] - lowest + works
+    return np.maximum(energy.residual, 0.0) / np.maximum(given, np.finfo(float).tiny)
+
+
+class Balance:
+    """Energy from nowhere, found look by look.
+
+    Args:
+        first: What robots have at the first look, in the order of the attributes of `Energy`, of
+            shape (11, N).
+    """
+
+    def __init__(self, first: np.ndarray) -> None:
+        self._first = np.array(first, np.float64)
+        self._lowest, self._works = np.inf, 0.0
+
+    def look(self, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`Energy.gain` and `Energy.residual` of what robots have ``now``, (11, N): (N,) each."""
+        table = np.stack([self._first, now], axis=-1)
+        table[4:] -= table[4:, :, :1]
+        energy = Energy(*table)
+        self._lowest = np.minimum(self._lowest, energy.gravity)
+        self._works = np.maximum(self._works, energy._works)
+        return _gain(energy, self._lowest, self._works)[:, -1], energy.residual[:, -1]

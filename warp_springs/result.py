@@ -40,7 +40,8 @@ class Result:
         steps: Steps of this run.
         status: Why each robot was stopped (0: it was not), values of ``Status``, shape (N,).
         status_time: When [s], NaN for the healthy, shape (N,). Health is looked at every
-            64 steps; a stopped robot stays where it was found healthy for the last time.
+            64 steps; a stopped robot stays where it was found healthy for the last time. For
+            ``Status.ENERGY`` it is the time of that pose itself.
         center_of_mass: Centre of mass at the end [m], shape (N, 3).
         times: Times of the F recorded frames [s], shape (F,); empty if none were.
         recorded: Indices of the recorded robots.

@@ -15,11 +15,12 @@ from warp_springs.batch import Batch
 from warp_springs.body.variants import Variants
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
+from warp_springs.engine.audit import Audit, flow_places
 from warp_springs.engine.control import pilots
 from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.engine.method import AUTO_DT, Method
 from warp_springs.engine.packing import aligned
-from warp_springs.engine.slices import Tape, cut, flow_places, run_all
+from warp_springs.engine.slices import Tape, cut, run_all
 from warp_springs.engine.worlds import Member, gathered, on_a_grid
 from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of
 from warp_springs.kernels.law import EVALUATIONS
@@ -27,7 +28,7 @@ from warp_springs.kernels.obstacles import obstacle_tables
 from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Scene
-from warp_springs.stability import Limits, Status
+from warp_springs.stability import Limits
 
 __all__ = ["Simulation"]
 
@@ -111,7 +112,6 @@ class Simulation:
         self.precision, self.integrator = precision, integrator
         self.threads = threads or usable_cores()
         self._step = 0
-        self._gained = np.full(len(self.robots), np.nan)  # when energy from nowhere was seen [s]
         self._underway: tuple | None = None
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
@@ -119,6 +119,7 @@ class Simulation:
         self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)
+        self._audits = [Audit(piece, self._batch, self.limits.gain) for piece in self._slices]
         constants = self._buffers["constants"]
         self._pilots = pilots(self._slices, self._batch, self.scene, constants, self.dt)
 
@@ -168,7 +169,9 @@ class Simulation:
                 step that is nearest. Neither frames nor the cutting of a run into several change
                 the motion by a bit.
             record: Robots whose frames are kept; by default, with ``fps``, all.
-            energy: Whether to compute energies at the frames (without ``fps``: at start and end).
+            energy: Whether to compute energies at the frames (without ``fps``: at start and end),
+                and to stop who gains energy from nowhere (``Status.ENERGY``). Frames, and where a
+                run begins, decide when that is noticed.
             progress: Called now and then with the fraction that is done, 0 to 1.
 
         Raises:
@@ -191,11 +194,21 @@ class Simulation:
         for pilot in self._pilots:
             if pilot is not None:
                 pilot.open(ledger=energy)
+        for audit in self._audits:
+            audit.open()
         tapes = [
             Tape(
-                piece, self._batch.slots, recorded, frame_steps, energy, pilot, self._batch.wearing
+                piece,
+                self._batch.slots,
+                recorded,
+                frame_steps,
+                energy,
+                audit,
+                self.dt,
+                pilot,
+                self._batch.wearing,
             )
-            for piece, pilot in zip(self._slices, self._pilots, strict=True)
+            for piece, audit, pilot in zip(self._slices, self._audits, self._pilots, strict=True)
         ]
 
         started = time.perf_counter()
@@ -282,33 +295,16 @@ class Simulation:
             found[robot] = np.stack([broken[place], worn[flow_places(place, lane)]])
         return found
 
-    def _find_gains(self, energy: Energy | None, times, status, stopped_at) -> None:
-        """Mark healthy robots that gained energy from nowhere, with the time it was first seen.
-
-        Who did so in an earlier run is marked ever after: no later piece of a trial is honest.
-        """
-        if energy is not None:
-            with np.errstate(over="ignore", invalid="ignore"):
-                seen = energy.gain > self.limits.gain
-                seen &= energy.residual > self._batch.rounding[:, None]
-            found = np.isnan(self._gained) & (status == Status.OK) & seen.any(axis=1)
-            self._gained[found] = times[np.argmax(seen[found], axis=1)]
-        marked = (status == Status.OK) & ~np.isnan(self._gained)
-        status[marked] = Status.ENERGY
-        stopped_at[marked] = self._gained[marked]
-
     def _result(self, first, frame_steps, recorded, tapes, wall_time: float) -> Result:
         slots, buffers = self._batch.slots, self._buffers
         lanes = slots.lane_indices(slice(None), 1)[:, 0]
         centers = slots.lane_indices(slice(None), 3)
         status = buffers["seen_states"][lanes].astype(np.int64)
         stopped_at = buffers["seen_state_times"][lanes]
-        energy = _energy(tapes, len(self.robots))
         # Steps before a robot was stopped count; each is of the robot's own size.
         until = np.where(status == 0, self.time, np.clip(stopped_at, first * self.dt, self.time))
         steps = np.rint((until - first * self.dt) / self.robot_dt).astype(np.int64)
         times = np.array(frame_steps, np.float64) * self.dt
-        self._find_gains(energy, times, status, stopped_at)
         return Result(
             robots=self.robots,
             scene=self.scene,
@@ -324,7 +320,7 @@ class Simulation:
             center_of_mass=buffers["seen_centers"][centers].astype(np.float64),
             times=times,
             recorded=tuple(recorded.tolist()),
-            energy=energy,
+            energy=_energy(tapes, len(self.robots)),
             spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
             _slots=copy.deepcopy(slots),  # robots may move later

@@ -49,8 +49,9 @@ class Status(enum.IntEnum):
     TOO_DEEP = 4
     #: The step is certain to be unstable for the robot's springs; it was never stepped.
     UNSTABLE_STEP = 5
-    #: It gained energy from nowhere, more than ``Limits.gain``; only seen with ``energy=True``. It
-    #: is found when a run is over: marked from then on, also in later runs, but not frozen.
+    #: It gained energy from nowhere, more than ``Limits.gain``. Only the ledger knows, so only with
+    #: ``energy=True``: the books are looked through at every frame and every 256 steps, and the
+    #: robot is frozen, with that time, at the last such look at which they balanced.
     ENERGY = 6
     #: A number of the robot does not exist in the precision of the run; it was never stepped.
     INVALID = 7

@@ -169,22 +169,69 @@ def test_reason(name, reasons):
     assert np.isnan(result.status_time[slot]) == (reasons == {"OK"})
 
 
-def test_what_makes_energy_from_nowhere_is_stopped_where_energies_are_asked_for():
-    # One sub-step a drift is too coarse for the ground: every bounce pumps the cube up.
-    ice = ws.Scene(ground=ws.Ground(static_friction=0.0, kinetic_friction=0.0))
+#: One sub-step a drift is too coarse for the ground: every bounce pumps a cube up.
+COARSE = {"dt": 1.97e-3, "integrator": "leapfrog", "contact_substeps": 1}
+ICE = ws.Scene(ground=ws.Ground(static_friction=0.0, kinetic_friction=0.0))
+
+
+@functools.cache
+def pumped(layout="lanes", energy=True):
+    """One cube that bounces and one that falls, for a while and a tenth more."""
     bouncing = cube().rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moved((0, 0, 0.3))
-    robots = [bouncing, cube().moved((0, 0, 50.0))]  # one bounces, the other falls
-    coarse = {"dt": 1.8e-3, "integrator": "leapfrog", "contact_substeps": 1}
-    simulation = ws.Simulation(robots, ice, **coarse)
-    result = simulation.run(3.0, fps=20, energy=True)
+    simulation = ws.Simulation([bouncing, cube().moved((0, 0, 50.0))], ICE, layout=layout, **COARSE)
+    return simulation.run(1.5, fps=20, energy=energy), simulation.run(0.1)
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat", "block"])
+def test_what_makes_energy_from_nowhere_is_frozen_where_its_books_last_balanced(layout):
+    result, later = pumped(layout)
     assert list(result.status) == [ws.Status.ENERGY, ws.Status.OK]
-    assert 0.2 < result.status_time[0] < 3.0
-    assert result.energy.gain[0].max() > ws.Limits().gain > result.energy.gain[1].max()
-    later = simulation.run(0.1)  # also where nobody looks at energies any more
+    since = result.status_time[0]
+    assert 0.2 < since < 1.5
+    assert result.energy.gain.max() <= ws.Limits().gain  # shown is what was honest
+    frozen, frames = result.times >= since, result.frames(0)
+    assert np.all(frames[frozen] == result.positions(0)) and frozen.any()
+    assert np.ptp(frames[~frozen][-5:], axis=0).max() > 1e-3
+    assert np.ptp(result.energy.total[0][frozen]) == 0.0
+    center = result.robots[0].masses @ result.positions(0) / result.robots[0].mass
+    assert result.center_of_mass[0] == pytest.approx(center, abs=1e-12)
+    # It stays there in later runs, also where nobody looks at energies any more.
     assert list(later.status) == [ws.Status.ENERGY, ws.Status.OK]
-    assert later.status_time[0] == result.status_time[0]
-    honest = ws.Simulation(robots, ice, dt=1e-3).run(3.0, fps=20, energy=True)
+    assert later.status_time[0] == since
+    assert later.positions(0).tobytes() == result.positions(0).tobytes()
+    assert later.spring_evaluations == 28 * later.steps
+    # Where they are not asked for it goes on, and its neighbour is the same to the bit.
+    unseen, after = pumped(layout, energy=False)
+    assert not unseen.status.any()
+    assert unseen.frames(1).tobytes() == result.frames(1).tobytes()
+    assert after.positions(1).tobytes() == later.positions(1).tobytes()
+
+
+def test_energy_from_nowhere_is_found_without_frames_and_before_what_follows():
+    bouncing = cube().rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moved((0, 0, 0.3))
+    found = ws.Simulation([bouncing] * 40, ICE, **COARSE).run(1.5, energy=True)
+    assert (found.status == ws.Status.ENERGY).all()
+    # Between the frames the books are looked through every 256 steps.
+    assert found.status_time == pytest.approx(256 * COARSE["dt"])
+
+
+def test_honest_robots_are_not_stopped_for_energy():
+    bouncing = cube().rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moved((0, 0, 0.3))
+    honest = ws.Simulation([bouncing, cube()], ICE, dt=1e-3).run(3.0, fps=20, energy=True)
     assert not honest.status.any() and honest.energy.gain.max() < 1e-2
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat"])
+def test_who_is_stopped_for_energy_gets_back_what_broke_since(layout):
+    fragile = cube().rotated((1, 2, 3), 0.7).spinning((3, -2, 4)).moved((0, 0, 0.3))
+    fragile = fragile.with_limits(breaks=15.0)
+    broken = []
+    for energy in (True, False):
+        simulation = ws.Simulation(fragile, ICE, layout=layout, **COARSE)
+        result = simulation.run(0.6, fps=20, energy=energy)
+        broken.append(np.isfinite(result.broken(0)).sum())
+        assert result.status[0] == (ws.Status.ENERGY if energy else ws.Status.OK)
+    assert broken[0] == 0 < broken[1]
 
 
 def test_what_is_no_number_any_more_is_stopped_as_such():

@@ -11,7 +11,7 @@ from dataclasses import fields, replace
 import numpy as np
 import warp as wp
 
-from warp_springs.batch import Batch
+from warp_springs.batch import Batch, Slots
 from warp_springs.engine.control import Reach
 from warp_springs.engine.gathering import (
     WEAR,
@@ -149,6 +149,14 @@ class Crowd:
         views["states"] = seen.seen_states
         table = np.stack([place, np.ones_like(place), lanes], axis=1)
         return Reach(views, self._given["model"].coefficients, table, cells)
+
+    def stop(self, slots: Slots, robots: np.ndarray, status: int, times: np.ndarray) -> None:
+        """Step some robots no more."""
+        state, here = self._given["state"], slots.bundle[robots] - self.first
+        for array, values in ((state.states, status), (state.state_times, times)):
+            known = array.numpy()
+            known[here] = values
+            array.assign(known)
 
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all robots from ``first_step`` to ``last_step`` of the run."""

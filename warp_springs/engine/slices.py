@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
+from warp_springs.engine.audit import AUDIT_EVERY, Audit, flow_places
 from warp_springs.engine.control import Pilot, Reach
 from warp_springs.engine.crowd import Crowd, crowds
 from warp_springs.engine.packing import aligned
@@ -21,7 +22,7 @@ from warp_springs.engine.reel import Reel
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES, real_dtype, structs
 from warp_springs.kernels.lanes import kernels, scratch_size
 
-__all__ = ["Slice", "Tape", "cut", "flow_places", "run_all"]
+__all__ = ["Slice", "Tape", "cut", "run_all"]
 
 #: Slices a thread, so that a thread that is done early takes over work of another.
 SLICES_PER_THREAD = 4
@@ -124,6 +125,11 @@ class Slice:
         coefficients = self._given["model"].coefficients
         return Reach(views, coefficients, np.stack([*place, lanes], axis=1), cells)
 
+    def stop(self, slots: Slots, robots: np.ndarray, status: int, times: np.ndarray) -> None:
+        """Step some robots no more."""
+        lanes = slots.lane_indices(robots, 1)[:, 0]
+        self.buffers["states"][lanes], self.buffers["state_times"][lanes] = status, times
+
     def advance(self, first_step: int, last_step: int) -> None:
         """Step all bundles from ``first_step`` to ``last_step``."""
         self._advance.set_param_by_name("first_step", first_step)
@@ -151,6 +157,8 @@ class Tape:
         signals: What the controllers of those who have any ask for.
         flowed: How far the springs of those that may break or yield have flowed [m].
         energies: Energies and ledger [J] of the members, (F, n, ENERGIES), if they are asked for.
+        audit: Who looks through the energies.
+        dt: Step of the run [s].
         pilot: Who sets muscles between the steps, if anybody.
         wearing: As in `Batch`.
         done: Steps done so far.
@@ -162,6 +170,8 @@ class Tape:
     recorded: np.ndarray
     frame_steps: Sequence[int]
     energy: bool
+    audit: Audit
+    dt: float
     pilot: Pilot | None = None
     wearing: Mapping[int, tuple[np.ndarray, int]] = field(default_factory=dict)
     done: int = 0
@@ -210,12 +220,12 @@ class Tape:
         frames = self.frame_steps if self.energy or len(self.recorded) else ()
         for index, step in enumerate(frames):
             at = self._advance(first, at, step, stop)
-            self.slice.observe(step, self._which)
-            self._take(index)
+            energies = self._look(step, self._which)
+            self._take(index, energies)
             self.taken = index + 1
         at = self._advance(first, at, last, stop)
         if not stop.is_set():
-            self.slice.observe(last)
+            self._look(last)
 
     def _advance(self, first: int, at: int, target: int, stop: threading.Event) -> int:
         steps = max(1, int(self.slice.launch_work / max(self.slice.work, 1)))
@@ -225,21 +235,34 @@ class Tape:
                 until = min(until, self.pilot.until(at))
             elif isinstance(self.slice, Slice):
                 self._close_ranks()
+            if self.energy:
+                until = min(until, (at // AUDIT_EVERY + 1) * AUDIT_EVERY)
             self.slice.advance(at, until)
             at = until
             self.done = at - first
+            if self.energy and at % AUDIT_EVERY == 0 and at < target:
+                self._look(at)
         return at
 
-    def _take(self, index: int) -> None:
+    def _look(self, step: int, which: wp.array | None = None) -> np.ndarray | None:
+        """Let what some bundles (default all) show at a step be seen; the members' energies."""
+        self.slice.observe(step, which)
+        if not self.energy:
+            self.audit.show()
+            return None
+        energies = self.slice.buffers["seen_energies"][self._lanes].astype(np.float64)
+        if self.pilot is not None:
+            energies[:, ENERGIES - len(ACCOUNTS)] += self.pilot.work[self.members]
+        return self.audit.look(self.members, step * self.dt, energies)
+
+    def _take(self, index: int, energies: np.ndarray | None) -> None:
         buffers = self.slice.buffers
         self.frames.take(index, buffers["seen_positions"])
         self.flowed.take(index, buffers["worn"])
         if len(self.signals):
             self.signals.take(index, self.pilot.heard())
-        if self.energy:
-            self.energies[index] = buffers["seen_energies"][self._lanes]
-            if self.pilot is not None:
-                self.energies[index, :, ENERGIES - len(ACCOUNTS)] += self.pilot.work[self.members]
+        if energies is not None:
+            self.energies[index] = energies
 
     def cut_to(self, frames: int) -> Tape:
         """A tape of the first frames alone; they are complete once they are ``taken``."""
@@ -254,11 +277,6 @@ class Tape:
         """Frames (F, M, 3) of each recorded robot."""
         shape = (len(self.frame_steps), -1, 3)
         return {robot: flat.reshape(shape) for robot, flat in self.frames.by_robot().items()}
-
-
-def flow_places(place: np.ndarray, lane: int) -> np.ndarray:
-    """Where it is kept how far springs have flowed, from `Batch.wearing`."""
-    return 2 * (place - lane) + lane
 
 
 def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress=None) -> None:
