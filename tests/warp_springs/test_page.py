@@ -273,6 +273,25 @@ def test_tethers_water_and_held_masses_are_drawn(browser, cube, tmp_path):
     assert wet[2].mean() - wet[0].mean() > dry[2].mean() - dry[0].mean() + 20, "water is blue"
 
 
+def test_broken_springs_are_no_longer_drawn(browser, tmp_path):
+    ends, apart = [(-0.1, 0.0, 0.2), (0.1, 0.0, 0.2)], [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    rod = ws.Robot(masses=1.0, positions=ends, springs=[(0, 1)], stiffness=100.0, velocities=apart)
+    space = ws.Scene(ground=None, gravity=(0, 0, 0))
+    result = ws.Simulation([rod.with_limits(breaks=10.0)], space).run(0.1, fps=100)
+    page = browser.open(ws.export_html(result, tmp_path / "torn.html").as_uri(), size=(800, 500))
+    page.wait("document.body.dataset.state === 'ready'")
+    page.key("Home")
+    colors = []
+    for _ in result.times:
+        middle = settled(page)[:370, :500].astype(int).min(axis=2)
+        colors.append(np.ptp(middle[150:250, 240:260], axis=0).max())
+        page.key("ArrowRight")
+    held = [time < result.broken(0)[0] for time in result.times]
+    assert any(held) and not all(held)
+    assert [bool(range_ > 30) for range_ in colors] == held
+    assert page.complaints == []
+
+
 def test_nothing_in_a_text_escapes_into_the_page(result):
     evil = "</script><script>alert(1)</script>"
     text = ws.html_page(result, title=evil, names={0: evil}, custom_data={0: {evil: evil}})

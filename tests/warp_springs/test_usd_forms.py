@@ -31,6 +31,18 @@ def result(tumbling_cube, walker):
     return ws.Simulation(robots, ws.Scene()).run(0.5, fps=FPS)
 
 
+@pytest.fixture(scope="module")
+def torn():
+    """Three masses in a row; the second spring breaks when the last mass has gone far enough."""
+    places = [(-0.1, 0.0, 0.1), (0.1, 0.0, 0.1), (0.3, 0.0, 0.1)]
+    rods = ws.Robot(masses=1.0, positions=places, springs=[(0, 1), (1, 2)], stiffness=100.0,
+                    velocities=[(0, 0, 0), (0, 0, 0), (2.0, 0, 0)])  # fmt: skip
+    space = ws.Scene(ground=None, gravity=(0, 0, 0))
+    result = ws.Simulation([rods.with_limits(breaks=[1e9, 10.0])], space).run(0.2, fps=100)
+    assert np.isnan(result.broken(0)[0]) and 0.05 < result.broken(0)[1] < 0.1
+    return result
+
+
 def assert_extents_hold(stage):
     """Every authored point lies inside the extent of its prim, in every frame."""
     for prim in stage.Traverse():
@@ -358,6 +370,23 @@ def test_a_calm_way_keeps_a_steady_pace_and_loses_the_bounce():
     bouncing = steady + np.outer(np.sin(20.0 * times), [0, 0, 0.05])
     assert np.abs(usd_cameras._smoothed(bouncing, times) - steady)[40:-40].max() < 1e-3
     np.testing.assert_array_equal(usd_cameras._smoothed(steady[:1], times[:1]), steady[:1])
+
+
+@pytest.mark.parametrize("geometry", ["skel", "mesh", "points"])
+def test_bars_of_broken_springs_vanish_when_they_break(torn, tmp_path, geometry):
+    path = ws.export_usd(torn, tmp_path / "torn.usdc", geometry=geometry)
+    assert validation_errors(path) == []
+    stage = opened(path)
+    bars = form(robots_of(stage)[0], "bars")
+    for frame, time in enumerate(torn.times):
+        if geometry == "points":
+            shown = np.array(UsdGeom.BasisCurves(bars).GetWidthsAttr().Get(frame)) > 0.0
+        else:
+            faces = np.array(UsdGeom.Mesh(bars).GetFaceVertexIndicesAttr().Get(frame))
+            has_area = np.ptp(faces.reshape(-1, 4), axis=1) > 0
+            shown = has_area.reshape(-1, 2).all(axis=0)
+            assert (has_area.reshape(-1, 2) == shown).all()
+        assert shown.tolist() == [True, not time >= torn.broken(0)[1]], frame
 
 
 # -- progress and choices ----------------------------------------------------------------------

@@ -67,11 +67,11 @@ class _Watcher:
             curve, unit, values = f"energy of {name}", "J", found.energy.total[shown[0]]
         self._server.show(
             done=done,
-            words=f"{done * seconds:.3g} of {seconds:g} s",
+            words=f"{round(done * seconds, 2):,.7g} of {seconds:,.7g} s",
             facts=[
                 ("robots", f"{len(found):,}"),
                 ("frames", f"{len(found.times):,}"),
-                ("pace", f"{done * seconds / passed:.3g} times real time"),
+                ("pace", f"{done * seconds / passed:,.2f} times real time"),
             ],
             curve=curve,
             unit=unit,

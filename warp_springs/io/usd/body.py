@@ -43,6 +43,7 @@ class Body(ABC):
         detail: How finely they are meshed.
         bent: Whether its masses turn on their own, so that bars stay round where it bends.
         far: Whether it goes so far that its place needs double precision.
+        gone: The frame from which each bar is hidden because its spring broke, shape (S,).
     """
 
     def __init__(
@@ -55,13 +56,14 @@ class Body(ABC):
         detail: Detail,
         bent: bool,
         far: bool,
+        gone: FloatArray,
     ) -> None:
         self._path = xform.GetPath()
         self._stage: Usd.Stage = xform.GetPrim().GetStage()
         self._robot, self._paint, self._looks = robot, paint, looks
         self._rest = robot.positions - robot.positions.mean(axis=0)
         self._bar, self._ball = radii
-        self._detail, self._bent = detail, bent
+        self._detail, self._bent, self._gone = detail, bent, gone
         self._reach = 1.001 * max(self._bar, self._ball)
         self._turned: FloatArray | None = None
         self._boxes: list[FloatArray] = []
@@ -92,6 +94,10 @@ class Body(ABC):
         """Write frames of masses in the robot's own frame [m], shape (F, M, 3)."""
 
     @abstractmethod
+    def _hide(self, gone: NDArray[np.bool_], time: int) -> None:
+        """Hide the bars of broken springs (S,) in a frame, and show the others."""
+
+    @abstractmethod
     def _extents(self) -> list[Usd.Attribute]:
         """The attributes that say what space the whole robot takes."""
 
@@ -115,6 +121,7 @@ class Body(ABC):
         self._boxes.append(np.stack([low, high], axis=1))
         self._write_moves(first, centres, turns)
         self._write_shape(first, local)
+        self._write_breaks(first, first + len(positions))
         if colors is not None and self._colors is not None:
             self._write_colors(first, colors)
 
@@ -141,6 +148,13 @@ class Body(ABC):
                 self._orient.Set(turn)
             self._translate.Set(centre, time)
             self._orient.Set(turn, time)
+
+    def _write_breaks(self, first: int, end: int) -> None:
+        """Bars vanish in the frame of their break; in the one before they are still whole."""
+        frames = self._gone[np.isfinite(self._gone)].astype(int).tolist()
+        changes = {time for frame in frames for time in (0, frame - 1, frame)}
+        for time in sorted(changes.intersection(range(first, end))):
+            self._hide(self._gone <= time, time)
 
     def _write_colors(self, first: int, colors: IntArray) -> None:
         """Colour indices hold until the next sample: frames without a change need none."""

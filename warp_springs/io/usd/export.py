@@ -237,7 +237,10 @@ def _write_motion(
     scale = appearance.stress_scale(_tension(result, each, sample))
     bent = each.geometry != "points" and _bends(each.robot, frames[item.source[sample]])
     far = bool(np.abs(item.box + each.offset).max() > _NEAR)
-    body = _body(each.geometry)(xform, each.robot, each.paint, looks, radii, detail, bent, far)
+    gone = item.gone[each.kept]
+    body = _body(each.geometry)(
+        xform, each.robot, each.paint, looks, radii, detail, bent, far, gone
+    )
     for add in (add_pushes, add_tethers):
         add(xform.GetPrim().GetStage(), looks, item, frames, each.offset, xform.GetPrim().GetName())
     step = max(1, _BLOCK_BYTES // body.bytes_a_frame)

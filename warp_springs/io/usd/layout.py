@@ -43,6 +43,7 @@ class Track:
         high: Highest corner of its box in each frame [m], shape (F, 3).
         ball: Radius of the balls at its masses [m].
         bar: Radius of its bars [m].
+        gone: The first frame that shows each spring broken, shape (S,); infinite where it holds.
     """
 
     index: int
@@ -53,6 +54,7 @@ class Track:
     high: FloatArray
     ball: float
     bar: float
+    gone: FloatArray
 
     @property
     def held_frames(self) -> int:
@@ -136,7 +138,9 @@ def track(result: Result, index: int) -> Track:
     reach = max(bar, ball)
     times = result.clock(index)[source]
     low, high = low[source] - reach, high[source] + reach
-    return Track(index, robot, times, source, low, high, ball, bar)
+    gone = np.searchsorted(times, result.broken(index)).astype(float)  # NaN comes after all times
+    gone[gone == len(times)] = np.inf
+    return Track(index, robot, times, source, low, high, ball, bar, gone)
 
 
 def placed(

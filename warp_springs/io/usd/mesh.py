@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 # Only the exporter imports this module, when it has something to write.
 from pxr import Sdf, Usd, UsdGeom, UsdShade  # noqa: TID253
@@ -17,7 +18,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdShade  # noqa: TID253
 from warp_springs.io.usd.body import Body, FloatArray, IntArray
 from warp_springs.io.usd.geometry import Part, balls, skin, tubes
 from warp_springs.io.usd.poses import mass_turns
-from warp_springs.io.usd.stage import add_subsets, bind, constant_color, define_mesh, vec3f
+from warp_springs.io.usd.stage import add_subsets, bind, constant_color, define_mesh, ints, vec3f
 from warp_springs.view import appearance
 
 _POINT_BYTES = 12
@@ -55,9 +56,16 @@ class Meshes(Body):
             elif name == "masses":
                 self._paint_balls(mesh, part)
             else:
+                self._bars = (mesh.GetFaceVertexIndicesAttr(), part.faces)
                 self._paint_on(mesh)
                 add_subsets(mesh, self._subsets())
             yield mesh, part
+
+    def _hide(self, gone: NDArray[np.bool_], time: int) -> None:
+        """The faces of a bar that is gone shrink to a point: their number and colours remain."""
+        indices, faces = self._bars
+        shown = np.where(self._spread(gone)[:, None], faces[:, :1], faces)
+        indices.Set(ints(shown.ravel()), time)
 
     def _paint_balls(self, mesh: UsdGeom.Mesh, part: Part) -> None:
         """Balls of held masses differ, in colour and in material."""

@@ -27,7 +27,8 @@ class PointsBody(Body):
         # What is drawn, and the mass that each of its points follows.
         self._forms: list[tuple[UsdGeom.PointBased, NDArray[np.int32]]] = []
         if robot.n_springs:
-            self._forms.append((self._add_bars(), robot.springs.ravel()))
+            self._bars = self._add_bars()
+            self._forms.append((self._bars, robot.springs.ravel()))
         if len(robot.faces):
             self._forms.append((self._add_skin(), self._corners))
         # Balls inside a body of this size would only hide each other.
@@ -52,6 +53,13 @@ class PointsBody(Body):
             points = form.GetPointsAttr()
             for time, frame in enumerate(local, start=first):
                 points.Set(Vt.Vec3fArray.FromNumpy(frame[masses]), time)
+
+    def _hide(self, gone: NDArray[np.bool_], time: int) -> None:
+        self._bars.SetWidthsInterpolation(UsdGeom.Tokens.uniform)
+        widths = np.where(gone, 0.0, 2.0 * self._bar).astype(np.float32)
+        if time == 0:
+            self._bars.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths))
+        self._bars.GetWidthsAttr().Set(Vt.FloatArray.FromNumpy(widths), time)
 
     def _extents(self) -> list[Usd.Attribute]:
         return [form.GetExtentAttr() for form, _ in self._forms]

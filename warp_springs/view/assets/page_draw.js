@@ -125,10 +125,13 @@ class Painter {
       firstSpring += robot.springs * frames;
       const tints = new Uint8Array(robot.springs * 3);
       robot.material.forEach((m, i) => tints.set(bytes(scene.materials[m].color), 3 * i));
+      const gone = new Float32Array(robot.springs).fill(frames);
+      for (const [spring, frame] of robot.gone) gone[spring] = frame;
       body.bars = this.vertexArray(() => {
         this.attribute(0, tubeBuffer, 3, gl.FLOAT);
         this.attribute(1, this.buffer(new Int32Array(robot.ends)), 2, gl.INT, 1);
         this.attribute(2, this.buffer(tints), 3, gl.UNSIGNED_BYTE, 1);
+        this.attribute(3, this.buffer(gone), 1, gl.FLOAT, 1);
       });
       const paints = new Uint8Array(robot.masses * 3);
       const held = new Set(robot.held);
@@ -262,7 +265,7 @@ class Painter {
         place: [...robot.center, robot.quantum] };
       const value = look.color === "material" ? [-1, -1] : at(body.firstSpring, robot.springs);
       if (robot.springs) {
-        this.use("bars" + kind, { ...own, value, radius: robot.bar, neutral: colors.neutral,
+        this.use("bars" + kind, { ...own, value, now: moment.a + moment.blend, radius: robot.bar, neutral: colors.neutral,
           levels: scene.levels, positive: ends[0], negative: ends[1], gloss: 0.25 });
         gl.bindVertexArray(body.bars);
         gl.drawArraysInstanced(gl.TRIANGLES, 0, body.tubeCount, robot.springs);

@@ -21,10 +21,11 @@ const BARS = `
 layout(location = 0) in vec3 shape;   // cosine, sine, share of the length
 layout(location = 1) in ivec2 ends;
 layout(location = 2) in vec3 tint;
+layout(location = 3) in float gone;   // the frame that first shows it broken
 uniform isampler2D values;
 uniform ivec2 value;   // texel of spring 0 in the two frames; below 0: colours by tint
 uniform mat4 camera;
-uniform float radius, levels;
+uniform float radius, levels, now;
 uniform vec3 neutral, positive, negative;
 out vec3 world, normal, color;
 ${MASSES}
@@ -39,7 +40,7 @@ void main() {
   world = mix(a, b, shape.z) + radius * normal;
   float v = value.x < 0 ? 0.0 : mix(level(value.x + gl_InstanceID), level(value.y + gl_InstanceID), blend);
   color = value.x < 0 ? tint : mix(neutral, v > 0.0 ? positive : negative, abs(v));
-  gl_Position = camera * vec4(world, 1);
+  gl_Position = now < gone ? camera * vec4(world, 1) : vec4(2, 2, 2, 1);
 }`;
 
 const BALLS = `

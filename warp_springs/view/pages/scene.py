@@ -120,6 +120,7 @@ def _body(item: Track, block: Block) -> dict[str, Any]:
         "bar": bar,
         "ball": ball,
         "held": robot.elements.bonds.masses.tolist(),
+        "gone": [[s, int(item.gone[s])] for s in np.flatnonzero(np.isfinite(item.gone)).tolist()],
         "ends": block.add(robot.springs, index),
         "corners": block.add(robot.faces, index),
     }
