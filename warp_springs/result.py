@@ -137,10 +137,10 @@ class Result:
         return self._wear(robot)[1]
 
     def signals(self, robot: int) -> np.ndarray:
-        """Outputs of a robot's controllers that its muscles obey at the end, shape (outputs,).
+        """What muscles do of the outputs of a robot's controllers at the end, shape (outputs,).
 
-        Those of all its controllers, one after the other; from -1 to 1, or the growth so far;
-        empty without any.
+        The outputs themselves, or behind them by the controller's ``response``. Those of all its
+        controllers, one after the other; from -1 to 1, or the growth so far; empty without any.
         """
         return self._signals.get(self._index(robot), np.zeros(0))
 

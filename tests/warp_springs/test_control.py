@@ -289,3 +289,17 @@ def test_a_lag_is_the_same_at_half_the_step_and_at_any_rate():
     ]
     for end in ends[1:]:
         np.testing.assert_allclose(end, ends[0], atol=2e-4)
+
+
+def test_rest_lengths_and_tensions_of_a_run_know_the_lag():
+    free, response = ws.Scene(gravity=(0, 0, 0), ground=None), 0.08
+    result = ws.Simulation(lagging(response), free, dt=DT).run(0.4, fps=50)
+    # Rest lengths change in steps; what holds around a frame is their mean over the step before.
+    target = 0.2 * 0.3 * np.tanh(0.5)
+    told = result.rest_length_frames(0)[1:, 0] - 0.2
+    late, early = (target * -np.expm1(-(result.times[1:] - ago) / response) for ago in (0.0, 0.01))
+    assert ((early - 1e-9 < told) & (told < late)).all() and told[0] < 0.5 * target
+    length = 0.2 + stretch_of(result.times[1:], response)
+    force = 50.0 * (length - 0.2 - told)
+    np.testing.assert_allclose(result.tension_frames(0)[1:, 0], force, atol=0.02)
+    assert result.rest_lengths(0)[0] - 0.2 == pytest.approx(told[-1])

@@ -153,7 +153,7 @@ class Pilot:
         kernel = control(piece.precision, ground, count)
         self._lanes = batch.slots.lane_indices(np.array(members), ENERGIES)
         self._members = np.array(members)
-        self.outputs = tables.outputs
+        self.outputs, self._averages = tables.outputs, np.concatenate(tables.averages)
         self._groups = []
         for pace, rows in tables.grouped().items():
             chosen = self._chosen(kernel, reach, tables.brains[rows], pace)
@@ -208,11 +208,11 @@ class Pilot:
         return seen[:, _CHANGED].astype(np.float64).sum(axis=1)
 
     def heard(self) -> np.ndarray:
-        """Outputs of all controllers, those of a robot at its `outputs`."""
-        return self._tables.signals.numpy()
+        """What muscles do of the outputs of all controllers, those of a robot at its `outputs`."""
+        return self._tables.activations.numpy()[self._averages]
 
     def signals(self) -> dict[int, np.ndarray]:
-        """Outputs of the controllers of each robot, end to end."""
+        """The same of each robot, end to end."""
         signals = self.heard()
         return {robot: signals[a:b].copy() for robot, (a, b) in self.outputs.items()}
 
@@ -228,6 +228,7 @@ class _Tables:
         self._ranks: dict[bytes, np.ndarray] = {}
         self._kept: list[Controller] = []  # an id is its owner's only while the owner lives
         self.outputs: dict[int, tuple[int, int]] = {}
+        self.averages: list[np.ndarray] = []  # of each controller, where they are kept
         rows, self._controllers, owner = [], [], []
         for index, place, cells in zip(members, reach.place, reach.cells, strict=True):
             start = self._sizes["signals"]
@@ -270,6 +271,8 @@ class _Tables:
         rank = self._rank(body)[muscles]
         outputs = np.broadcast_to(np.array(controller.outputs).T, (2, len(muscles)))
         table = np.stack([*outputs, cells[0][rank], cells[1][rank]], axis=1)
+        activation = self._add("activations", np.zeros(2 * controller.n_outputs))
+        self.averages.append(activation + controller.n_outputs + np.arange(controller.n_outputs))
         half = 0.5 * loops.values(index, "stiffness")[muscles]
         rest = half * lengths[muscles]
         hidden, growth = controller.hidden, controller.growth
@@ -290,7 +293,7 @@ class _Tables:
             "memory": self._add("memories", np.zeros(scratch)),
             "reading": self._add("readings", np.zeros(controller.n_readings)),
             "signal": self._add("signals", np.zeros(controller.n_outputs)),
-            "activation": self._add("activations", np.zeros(2 * controller.n_outputs)),
+            "activation": activation,
             "muscle": self._add("muscles", table) // 4,
             "muscles": len(muscles),
             "growth": -1 if growth is None else self._growth(controller, growth),

@@ -40,7 +40,7 @@ BRAIN = (
     "signal",
     "muscle",  # its first, and how many
     "muscles",
-    "activation",  # one for each output
+    "activation",  # two for each output: what muscles do of it, now and on average until the next
     "growth",  # -1: its outputs do not grow
 )
 #: Columns of the table of sensors: kind, first entry of the list of what it sits on, how many.
@@ -65,7 +65,7 @@ TABLES = {
     "memories": np.float64,
     "readings": np.float64,
     "signals": np.float64,  # outputs, or what has grown
-    "activations": np.float64,  # what the muscles do of a signal, so far
+    "activations": np.float64,  # what the muscles do of a signal
 }
 
 _BRAIN = r"""
@@ -215,19 +215,19 @@ if (growing && wanted > 0.0) {
 
 _FOLLOW = r"""
 double* const activation = tables.activations.data + brain[17];
+double* const average = activation + outputs;
+for (int64_t j = 0; j < outputs; ++j) {
+    const double lag = activation[j] - signal[j];
+    average[j] = signal[j] + mean * lag;
+    activation[j] = signal[j] + left * lag;
+}
 for (int64_t m = brain[15]; m < brain[15] + brain[16]; ++m) {
     const int64_t* const muscle = tables.muscles.data + 4 * m;
     const double* const strength = tables.strengths.data + 2 * m;
-    double a = 0.0;
-    for (int e = 0; e < 2; ++e) {
-        const double target = signal[muscle[e]];
-        a += 0.5 * (target + mean * (activation[muscle[e]] - target));
-    }
+    const double a = 0.5 * (average[muscle[0]] + average[muscle[1]]);
     const double h = strength[0] + strength[1] * a;
     coefficients.data[muscle[2]] = coefficients.data[muscle[3]] = (coefficient)h;
 }
-for (int64_t j = 0; j < outputs; ++j)
-    activation[j] = signal[j] + left * (activation[j] - signal[j]);
 """
 
 
