@@ -45,6 +45,10 @@ def main() -> None:
         sys.exit(command.run(Console()) or 0)
     except KeyboardInterrupt:
         sys.exit(130)
+    except BrokenPipeError:
+        # Whoever read our output has gone: there is nobody left to tell.
+        sys.stdout = None
+        sys.exit(1)
     except (OSError, ValueError, RuntimeError) as error:
         print(f"warp-springs: {' '.join(str(error).split())}", file=sys.stderr)
         sys.exit(1)

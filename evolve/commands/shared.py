@@ -50,6 +50,8 @@ def evolve_to_the_end(
     together: Sequence[runs.Run], console: Console, extras: Extras = Extras()
 ) -> int:
     """Evolve runs to their end, or until Ctrl-C, with everything a person wants to see."""
+    from rich.markup import escape
+
     import warp_springs as ws
     from evolve.fitness import UNITS
     from evolve.reports.figures import describe
@@ -58,12 +60,14 @@ def evolve_to_the_end(
 
     config = together[0].config
     folder = together[0].directory if len(together) == 1 else together[0].directory.parent
-    console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
+    console.print(
+        f"[bold]{escape(config.name)}[/]  {escape(config.about)}", highlight=False, soft_wrap=True
+    )
     facts = [*describe(config), ("folder", str(folder))]
     if len(together) > 1:
         facts.append(("seeds", ", ".join(str(run.config.seed) for run in together)))
     for subject, words in facts:
-        console.print(f"[dim]{subject:<8}[/]{words}", highlight=False, soft_wrap=True)
+        console.print(f"[dim]{subject:<8}[/]{escape(words)}", highlight=False, soft_wrap=True)
     ws.quiet()
     screen = Screen(console, UNITS[config.task.fitness], len(together))
     try:
@@ -121,13 +125,17 @@ def _report(together: Sequence[runs.Run], folder: Path, console: Console) -> Non
 
 def _finish(run: runs.Run, console: Console, extras: Extras) -> None:
     """Crown the champion, write everything, and say what came of the run."""
+    from rich.markup import escape
+
     from evolve.reports.export import export
     from evolve.reports.figures import draw, results, verdict
 
     with console.status("looking twice at the best, writing animations and plots"):
         finalists, animations = export(run)
         plots = draw(run)
-    console.print(f"[bold]{verdict(finalists, run.config)}[/]", highlight=False, soft_wrap=True)
+    console.print(
+        f"[bold]{escape(verdict(finalists, run.config))}[/]", highlight=False, soft_wrap=True
+    )
     with run.read() as store:
         facts = dict(results(store, run.config))
     print(f"{facts['cost']}: {facts['speed']}; the driver took {facts['driver']}")

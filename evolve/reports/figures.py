@@ -141,6 +141,7 @@ def results(store: Store, config: RunConfig) -> Iterator[tuple[str, str]]:
 
 def table(run: Run) -> Table:
     """Parameters and results of a run, for the terminal."""
+    from rich.markup import escape
     from rich.table import Table
 
     sheet = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
@@ -148,7 +149,7 @@ def table(run: Run) -> Table:
     sheet.add_column(overflow="fold")
     with run.read() as store:
         for subject, words in [*describe(run.config), *results(store, run.config)]:
-            sheet.add_row(subject, words)
+            sheet.add_row(subject, escape(words))
     return sheet
 
 

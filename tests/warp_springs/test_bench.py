@@ -108,11 +108,11 @@ def bench(*arguments):
 
 
 def test_the_command(tmp_path):
-    out = tmp_path / "deep" / "bench.json"
+    out = tmp_path / "[deep]" / "bench.json"
     done = bench("--quick", "--section", "population", "--sizes", "1", "16", "--json", str(out))
     assert done.returncode == 0, done.stderr
     assert "processor" in done.stdout
-    assert "first use" in done.stdout
+    assert "error [m]" in done.stdout and "first use [s]" in done.stdout
     assert str(out) in done.stdout
     written = json.loads(out.read_text())
     assert written["machine"]["warp_springs"] == ws.__version__

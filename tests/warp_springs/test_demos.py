@@ -5,11 +5,12 @@ import sys
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from warp_springs import demos
 from warp_springs.config import SceneFile, parse
 from warp_springs.demos.findings import bounces, findings, heights, peak_deceleration
-from warp_springs.demos.slope import trials
+from warp_springs.demos.slope import demonstrate, trials
 from warp_springs.materials import FRICTION
 from warp_springs.view.outputs import write_outputs
 from warp_springs.view.parameters import energy_change
@@ -87,6 +88,19 @@ def test_cubes_stay_and_slide_as_predicted(pair):
     (trial,) = trials(demos.load("slope"), {pair: FRICTION[pair]})
     assert trial.creep < 1e-7
     assert trial.measured == pytest.approx(trial.predicted, rel=2e-3)
+
+
+def test_the_slope_says_units_beside_what_it_found(tmp_path, capsys, monkeypatch):
+    few = {pair: FRICTION[pair] for pair in list(FRICTION)[:4]}
+    monkeypatch.setattr("warp_springs.demos.slope.trials", lambda config: trials(config, few))
+    folder = tmp_path / "[out]"
+    assert demonstrate(demos.load("slope"), folder, Console(width=80)) == 0
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    assert " ".join(lines[2].split()) == "surfaces mu_s mu_k [°] [nm] [°] [m/s²] [m/s²]"
+    assert lines[3].startswith("steel on steel")
+    assert all(str(path) in printed for path in folder.glob("slope*"))
+    assert "creep [nm]" in (folder / "slope_parameters.md").read_text()
 
 
 def test_a_scene_file_that_was_written_is_the_demonstration(tmp_path):

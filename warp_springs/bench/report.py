@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from warp_springs.bench.measure import Row
@@ -37,7 +38,7 @@ def show(console: Console, title: str, rows: Sequence[Row]) -> None:
         words = name in ("features", "topology", "layout", "integrator", "precision")
         made.add_column(name, justify="left" if words else "right")
     for name in ("M springs/s", "error [m]", "first use [s]"):
-        made.add_column(name, justify="right")
+        made.add_column(escape(name), justify="right")
     for index, row in enumerate(rows):
         made.add_row(*(columns[name][index] for name in varying), *_measured(row))
     console.print(f"\n[bold]{title}[/]\n[dim]{', '.join(common)}[/]")

@@ -67,7 +67,7 @@ class BenchCommand:
 
         self._check()
         facts = machine(self.device)
-        console.print(", ".join(f"{name} {value}" for name, value in facts.items()))
+        console.print(", ".join(f"{name} {value}" for name, value in facts.items()), markup=False)
         base = base_case(self.device, self.threads, self.quick)
         sizes = [size for size in self.sizes if size <= 64] or [1] if self.quick else self.sizes
         rounds, seconds = (2, 0.02) if self.quick else (self.rounds, self.seconds)
@@ -81,7 +81,7 @@ class BenchCommand:
             every += rows
         write(self.json, facts, lines)
         _say_what_failed(console, every)
-        console.print(f"\nwrote {self.json}", soft_wrap=True)
+        console.print(f"\nwrote {self.json}", markup=False, soft_wrap=True)
         wrong = sum(bool(row.wrong) for row in every)
         if wrong:
             raise RuntimeError(f"{wrong} of {len(every)} rows are wrong")
@@ -98,10 +98,13 @@ class BenchCommand:
 
 
 def _say_what_failed(console: Console, rows: list[Row]) -> None:
+    from rich.markup import escape
+
     from warp_springs.bench.measure import describe
 
     for row in rows:
         if row.wrong:
-            console.print(f"[bold red]wrong[/]: {describe(row.case)}: {row.wrong}")
+            console.print(f"[bold red]wrong[/]: {escape(f'{describe(row.case)}: {row.wrong}')}")
         if row.missing:
-            console.print(f"not here: {describe(row.case)}, {row.case.layout}: {row.missing}")
+            words = f"not here: {describe(row.case)}, {row.case.layout}: {row.missing}"
+            console.print(escape(words))

@@ -66,7 +66,7 @@ class ExportCommand:
                 spacing=self.spacing,
                 progress=done,
             )
-        console.print(f"wrote {path}", soft_wrap=True)
+        console.print(f"wrote {path}", markup=False, soft_wrap=True)
 
     def _names(self, recorded: tuple[int, ...]) -> dict[int, str] | None:
         if self.names is None:

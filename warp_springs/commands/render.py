@@ -97,7 +97,7 @@ class RenderCommand:
         with progress(console, "drawing") as done, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the number of cycles has been settled here
             path = ws.render(result, self.out, progress=done, **given)
-        console.print(f"wrote {path}", soft_wrap=True)
+        console.print(f"wrote {path}", markup=False, soft_wrap=True)
 
     def _three_cycles(self, console: Console, result: Result) -> tuple[Result, RenderCommand]:
         """The result, or a longer one of the robots that are shown if it holds too few cycles."""

@@ -53,4 +53,4 @@ class ReportCommand:
         out = beside if self.out is None else self.out
         with console.status("writing the report") as status:
             path = ws.write_report(result, out, **known, progress=status.update)
-        console.print(f"wrote {path}", soft_wrap=True)
+        console.print(f"wrote {path}", markup=False, soft_wrap=True)

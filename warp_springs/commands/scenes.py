@@ -27,7 +27,11 @@ def simulated(
     watch: Callable[[Simulation, float], None] | None = None,
 ) -> Result:
     """Simulate a scene file with a bar that shows the progress; `watch` as in `SceneFile.run`."""
-    console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
+    from rich.markup import escape
+
+    console.print(
+        f"[bold]{escape(config.name)}[/]  {escape(config.about)}", highlight=False, soft_wrap=True
+    )
     with progress(console, "simulating") as advance:
         return config.run(advance, watch)
 
@@ -55,11 +59,12 @@ def write_and_say(
 
 def print_rows(console: Console, rows: list[tuple[str, str]], title: str | None = None) -> None:
     """Print a table with two columns."""
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     for name, value in rows:
-        table.add_row(name, value)
+        table.add_row(escape(name), escape(value))
     console.print(table, highlight=False)

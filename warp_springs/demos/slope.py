@@ -151,13 +151,17 @@ def _acceleration(result: Result) -> float:
 
 def demonstrate(config: SceneFile, folder: Path, console: Console) -> int:
     """Run all trials, write table, plots and animations, and say what was written."""
+    from rich.markup import escape
+
     import warp_springs as ws
     from warp_springs.config import dump
     from warp_springs.io.outputs import written_beside
     from warp_springs.view.outputs import save_figure
     from warp_springs.view.parameters import as_markdown, outcome, parameters
 
-    console.print(f"[bold]{config.name}[/]  {config.about}", highlight=False, soft_wrap=True)
+    console.print(
+        f"[bold]{escape(config.name)}[/]  {escape(config.about)}", highlight=False, soft_wrap=True
+    )
     with console.status("simulating"):
         done = trials(config)
     folder.mkdir(parents=True, exist_ok=True)
@@ -197,11 +201,14 @@ def _markdown(done: list[Trial]) -> str:
 
 
 def _print(console: Console, done: list[Trial]) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="dim")
     for number, heading in enumerate(HEADINGS):
-        table.add_column(heading, justify="right" if number else "left")
+        name, _, unit = heading.partition(" [")
+        words = escape(f"{name}\n[{unit}" if unit else name)
+        table.add_column(words, justify="right" if number else "left", no_wrap=number > 0)
     for trial in done:
         table.add_row(*_cells(trial))
     console.print(table, highlight=False)
