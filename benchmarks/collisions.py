@@ -188,8 +188,12 @@ def table(rows: Iterable[dict]) -> None:
     for number, row in enumerate(rows):
         if number == 0:
             print("| " + " | ".join(row) + " |\n|" + "---|" * len(row))
-        cells = [f"{v:.2g}" if isinstance(v, float) else str(v) for v in row.values()]
+        cells = [_figure(v) if isinstance(v, float) else str(v) for v in row.values()]
         print("| " + " | ".join(cells) + " |", flush=True)
+
+
+def _figure(value: float) -> str:
+    return f"{value:,.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.2g}"
 
 
 def main() -> None:

@@ -343,6 +343,19 @@ def test_data_come_back(robot, tmp_path, suffix):
     assert twice.stiffness == pytest.approx(robot.stiffness)
 
 
+@pytest.mark.parametrize("suffix", ["vtu", "vtk", "xdmf", "med"])
+def test_a_skin_that_no_springs_border_adds_none(robot, tmp_path, suffix):
+    edges = np.sort(robot.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).tolist()
+    kept = np.array([sorted(pair) not in edges[:5] for pair in robot.springs.tolist()])
+    assert kept.sum() == robot.n_springs - 5
+    bare = ws.Robot(masses=robot.masses, positions=robot.positions, springs=robot.springs[kept],
+                    stiffness=robot.stiffness[kept], faces=robot.faces)  # fmt: skip
+    ws.write_mesh(bare, tmp_path / f"bare.{suffix}")
+    read = ws.read_mesh(tmp_path / f"bare.{suffix}")
+    assert read.n_springs == bare.n_springs and len(read.faces) == len(robot.faces)
+    assert read.stiffness == pytest.approx(bare.stiffness, rel=1e-12)
+
+
 def test_labels_come_back_from_gmsh(robot, tmp_path):
     ws.write_mesh(robot, tmp_path / "robot.msh")
     read = ws.read_mesh(tmp_path / "robot.msh", materials={1: TISSUE, 2: MUSCLE})

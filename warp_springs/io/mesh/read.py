@@ -72,7 +72,7 @@ def read_mesh(
     regions stay apart. A spring between cells of several materials has that of the first.
 
     What `write_mesh` wrote, mass and velocity of points, stiffness, rest_length, amplitude and
-    phase of lines, is taken over.
+    phase of lines, is taken over; edges of surface cells of stiffness 0, its skin, are no springs.
 
     Args:
         path: The file.
@@ -101,6 +101,8 @@ def read_mesh(
         points, blocks, used, kept = _body(mesh)
         points = points * factor
         springs, owner, cell = springs_of_cells(blocks, diagonals)
+        carrying = ~_of_skin(mesh, kept, owner, cell)
+        springs, owner, cell = springs[carrying], owner[carrying], cell[carrying]
         if len(springs) == 0:
             raise ValueError("it holds no lines, triangles, tetrahedra or other cells with edges")
         data = _line_data(mesh, kept, owner, cell, factor)
@@ -252,6 +254,18 @@ def _line_data(
         values = np.concatenate(arrays)[place]
         data[name] = (rows, values * factor if name in _LENGTHS else values)
     return data
+
+
+def _of_skin(
+    mesh: meshio.Mesh, kept: Sequence[int], owner: IndexArray, cell: IndexArray
+) -> np.ndarray:
+    """Which springs are only edges of surface cells that are said to have no stiffness, (S,)."""
+    given = mesh.cell_data.get("stiffness")
+    if given is None:
+        return np.zeros(len(owner), bool)
+    surface = np.array([mesh.cells[number].dim == 2 for number in kept])
+    values = np.concatenate([np.asarray(given[number], np.float64).ravel() for number in kept])
+    return surface[owner] & (values[_places(mesh, kept, owner, cell)] == 0.0)
 
 
 def _places(
