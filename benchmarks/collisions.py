@@ -205,6 +205,7 @@ def main() -> None:
     parser.add_argument("--rest", type=float, help="seconds that a pile is left alone")
     parser.add_argument("--balls", type=int, nargs="+", default=[2, 3, 4], help="subdivisions")
     given = parser.parse_args()
+    ws.quiet()
     if given.rest:
         table([resting(given.rest)])
         return

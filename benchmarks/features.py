@@ -360,6 +360,7 @@ def main() -> None:
     parser.add_argument("--bodies", action="store_true", help="bodies, files and demonstrations")
     parser.add_argument("--json", type=Path, help="write all figures to this file as well")
     options = parser.parse_args()
+    ws.quiet()
     count = options.robots or (128 if options.layout == "lanes" else 4)
     console = Console()
     report = {"machine": machine("cpu"), "layout": options.layout, "robots": count}
