@@ -23,8 +23,9 @@ from evolve.errors import RunError, StoreError
 from evolve.judging.judge import Simulator
 from evolve.lock import Lock
 from evolve.provenance import decisive, origin
+from evolve.record import Timing
 from evolve.search import Generation, Search, judge_together
-from evolve.store import Store, Timing
+from evolve.store import Store
 from evolve.toml import dump, load, parse, validate
 
 __all__ = [

@@ -1,10 +1,8 @@
 """The record of a run: one SQLite file that holds every evaluation and survives being killed.
 
-A generation is one transaction, so whatever moment the process dies at, the file holds whole
-generations and the state of the optimizer after the last of them. Nothing waits for the disk but
-SQLite's checkpoints: if the power fails, the last generations may be missing, and a resumed run
-computes them again, to the same bits. The tables are made to be
-asked in SQL::
+A generation is one transaction, on the disk before the next one is told of: whatever moment the
+process dies or the power fails at, the file holds whole generations and the state of the optimizer
+after the last of them. The tables are made to be asked in SQL::
 
     -- everybody the champion descends from
     WITH RECURSIVE line(id) AS (
@@ -20,7 +18,6 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,66 +27,12 @@ from evolve import schema
 from evolve.errors import StoreError
 from evolve.judging.scores import Scores
 from evolve.optimizers.base import NOBODY, Candidates
+from evolve.record import Ancestor, Finalist, Record, Timing
 
 if TYPE_CHECKING:
     from evolve.judging.second_look import SecondLook
 
-__all__ = ["Ancestor", "Finalist", "Record", "Store", "Timing"]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """How long the parts of a generation took [s]."""
-
-    evaluation: float
-    driver: float
-
-
-@dataclass(frozen=True)
-class Record:
-    """All evaluations of a run as columns, in the order of the ids; n of them."""
-
-    ids: np.ndarray
-    """Shape (n,), int64."""
-    generations: np.ndarray
-    """Shape (n,), int64."""
-    fitness: np.ndarray
-    """Shape (n,), float64; NaN = no fitness."""
-    status: np.ndarray
-    """Shape (n,), int64."""
-
-
-@dataclass(frozen=True)
-class Finalist:
-    """An individual that was looked at twice."""
-
-    id: int
-    generation: int
-    fitness: float
-    dt: float
-    """Half the step that it took at first, or less where that was not stable [s]."""
-    halved: float
-    """Fitness at that step in float64; NaN = none."""
-    halved_kept: float
-    """That fitness / fitness."""
-    perturbed: float
-    """Quantile of the fitness from perturbed starts; NaN = none."""
-    perturbed_kept: float
-    """That fitness / fitness."""
-    survives: bool
-    """Whether enough is left of both."""
-
-
-@dataclass(frozen=True)
-class Ancestor:
-    """An individual in the line of descent of another."""
-
-    id: int
-    generation: int
-    fitness: float
-    """NaN = none."""
-    parents: tuple[int, ...]
-    """Ids of its parents: none, one or two."""
+__all__ = ["Store"]
 
 
 class Store:
@@ -98,6 +41,7 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.path = path
         self._connection = connection
+        connection.execute("PRAGMA synchronous = FULL")
 
     @classmethod
     def create(cls, path: Path, meta: Mapping[str, str], descriptors: Sequence[str]) -> Store:
@@ -107,7 +51,6 @@ class Store:
         connection = sqlite3.connect(path, isolation_level=None)
         connection.execute("PRAGMA page_size = 16384")
         connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = NORMAL")
         columns = "".join(f', "{name}" REAL' for name in descriptors)
         store = cls(connection, path)
         with store._transaction():
@@ -134,7 +77,6 @@ class Store:
         connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=30.0)
         try:
             schema.check(connection, path, thoroughly=write)
-            connection.execute("PRAGMA synchronous = NORMAL")
             connection.execute(f"PRAGMA query_only = {not write}")
         except BaseException:
             connection.close()

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from evolve.config import DESCRIPTORS
+from evolve.record import Finalist
 from evolve.reports.archive import atlas, niches
 from evolve.run import Run
-from evolve.store import Finalist, Store
+from evolve.store import Store
 
 __all__ = ["shown", "spread_out", "various"]
 

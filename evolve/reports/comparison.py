@@ -11,9 +11,9 @@ import numpy as np
 from evolve.config import RunConfig
 from evolve.fitness import UNITS
 from evolve.provenance import decisive
+from evolve.record import Finalist, Record
 from evolve.reports.units import titled
 from evolve.run import Run
-from evolve.store import Finalist, Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

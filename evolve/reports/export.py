@@ -12,11 +12,12 @@ from evolve.errors import RunError
 from evolve.judging.evaluate import Evaluator
 from evolve.judging.second_look import SecondLook
 from evolve.judging.worlds import looked_at_again
+from evolve.record import Finalist
 from evolve.reports.archive import niches
 from evolve.reports.bodies import shown, various
 from evolve.reports.show import FILM_CYCLES, Show, Style, Watch, label
 from evolve.run import Run
-from evolve.store import Finalist, Store
+from evolve.store import Store
 
 if TYPE_CHECKING:
     import warp_springs as ws

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evolve.fitness import UNITS
+from evolve.record import Ancestor
 from evolve.reports.export import trial
 from evolve.reports.plots import figure
 from evolve.reports.units import titled
-from evolve.store import Ancestor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

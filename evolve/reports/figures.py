@@ -11,10 +11,11 @@ import numpy as np
 from evolve.config import RunConfig, SecondLookConfig
 from evolve.errors import RunError
 from evolve.fitness import UNITS
+from evolve.record import Finalist, Record
 from evolve.reports.plots import dot_plot, figure, learning_curve
 from evolve.reports.units import with_unit
 from evolve.run import Run
-from evolve.store import Finalist, Record, Store
+from evolve.store import Store
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from evolve.record import Finalist, Record
 from evolve.reports.comparison import Group, best_so_far
 from evolve.reports.units import in_units, with_unit
-from evolve.store import Finalist, Record
 
 __all__ = ["findings"]
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from evolve.store import Record
+    from evolve.record import Record
 
 __all__ = ["dot_plot", "figure", "learning_curve", "performance"]
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from evolve.judging.evaluate import Evaluator
 from evolve.judging.worlds import film_of
+from evolve.record import Finalist
 from evolve.run import Run
-from evolve.store import Finalist, Store
+from evolve.store import Store
 
 if TYPE_CHECKING:
     import warp_springs as ws

@@ -10,10 +10,10 @@ import numpy as np
 
 from evolve.errors import RunError
 from evolve.fitness import UNITS
+from evolve.record import Finalist, Record
 from evolve.reports.bodies import shown
 from evolve.reports.export import FILM_CYCLES, ZOO_SIZE, trial
 from evolve.run import Run
-from evolve.store import Finalist, Record
 
 if TYPE_CHECKING:
     import warp_springs as ws

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from evolve.record import Ancestor
 from evolve.reports.family import family_tree, line, steps
-from evolve.store import Ancestor
 
 EVERYBODY = [
     Ancestor(5, 3, 4.0, (4, 3)),

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from evolve.errors import RunError
+from evolve.record import Finalist, Record
 from evolve.reports.figures import clock, demotions, draw, table, verdict
 from evolve.reports.plots import dot_plot, figure, learning_curve
 from evolve.run import Run
 from evolve.screen import BLOCKS, Screen, sparkline
-from evolve.store import Finalist, Record
 
 
 @pytest.fixture

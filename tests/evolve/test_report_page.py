@@ -10,6 +10,7 @@ import pytest
 
 from evolve.config import RunConfig
 from evolve.errors import RunError
+from evolve.record import Finalist, Record
 from evolve.reports.comparison import groups
 from evolve.reports.diversity import diversity
 from evolve.reports.export import crown
@@ -19,7 +20,7 @@ from evolve.reports.parameters import parameters
 from evolve.reports.plots import figure, performance
 from evolve.reports.tables import write_table
 from evolve.run import Run
-from evolve.store import Finalist, Record, Store
+from evolve.store import Store
 from evolve.toml import load
 from tests.chromium import Browser
 from tests.evolve.conftest import TINY

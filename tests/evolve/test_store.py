@@ -10,8 +10,9 @@ from evolve.judging.scores import Scores
 from evolve.judging.second_look import SecondLook
 from evolve.lock import Lock
 from evolve.optimizers import NOBODY, Candidates
+from evolve.record import Finalist, Timing
 from evolve.schema import APPLICATION_ID, VERSION
-from evolve.store import Finalist, Store, Timing
+from evolve.store import Store
 
 DESCRIPTORS = ("height", "a name with spaces")
 
