@@ -103,21 +103,30 @@ class FixedBody:
         """
         settings, lengths = self.settings, self.body.lengths
         (low, high), (soft, hard) = settings.rest_length, settings.stiffness
-        rests = (high - low) * self.spread(rest)
-        rests += low
-        rests *= lengths
-        reaches = settings.amplitude * self.spread(amplitude)
-        reaches *= lengths
-        stiffnesses = (hard / soft) ** self.spread(stiffness)
-        stiffnesses *= soft
+        rests = self._spread(rest)
+        rests *= (high - low) * lengths
+        rests += low * lengths
+        reaches = self._spread(amplitude)
+        reaches *= settings.amplitude * lengths
+        phases = self._spread(phase)
+        if self._later.any():
+            phases += self._later
+        phases *= 2.0 * np.pi
+        stiffnesses = self._spread(stiffness)
+        stiffnesses *= np.log(hard / soft)
+        stiffnesses += np.log(soft)
         return self.variants(
             rest_length=rests,
             amplitude=reaches,
-            phase=2.0 * np.pi * self.spread_phase(phase),
-            stiffness=stiffnesses,
+            phase=phases,
+            stiffness=np.exp(stiffnesses, out=stiffnesses),
             omega=np.full(len(rest), 2.0 * np.pi / settings.period),
             **more,
         )
+
+    def _spread(self, values: np.ndarray) -> np.ndarray:
+        """As `spread`, in float64, to be written to."""
+        return np.array(self.spread(values), np.float64)
 
     def variants(self, **fields: np.ndarray) -> ws.Variants:
         """The robots of fields of `ws.Variants`, whose passive springs are those of the body."""
@@ -140,32 +149,38 @@ class FixedBody:
 
     def balls(self, n: int, rng: np.random.Generator) -> np.ndarray:
         """For each of n genomes, the springs within a ball about one of them: (n, R), bool."""
-        centres = self.middles[rng.integers(len(self.own), size=n)]
-        reach = float(np.linalg.norm(np.ptp(self.middles, axis=0)))
-        radii = rng.random(n) * (0.5 * reach)
+        middles = self.middles.astype(np.float32)
+        centres = middles[rng.integers(len(self.own), size=n)]
+        reach = 0.5 * float(np.linalg.norm(np.ptp(self.middles, axis=0)))
+        radii = reach * rng.random((n, 1), dtype=np.float32)
         inside = np.empty((n, len(self.own)), bool)
         for rows in self._pieces(n):
-            squared = sum((self.middles[:, i] - centres[rows, i, None]) ** 2 for i in range(3))
-            np.less_equal(squared, radii[rows, None] ** 2, out=inside[rows])
+            x, y, z = (middles[:, i] - centres[rows, i, None] for i in range(3))
+            for way in (x, y, z):
+                way *= way
+            x += y
+            x += z
+            np.less_equal(x, radii[rows] ** 2, out=inside[rows])
         return inside
 
     def half_spaces(self, n: int, rng: np.random.Generator) -> np.ndarray:
         """For each of n pairs, the springs on one side of a plane through the body: (n, R)."""
-        normals = rng.standard_normal((n, 3))
-        through = self.middles[rng.integers(len(self.own), size=n)]
-        # Written out: a matrix product might add up differently on another number of threads.
+        middles = self.middles.astype(np.float32)
+        normals = rng.standard_normal((n, 3), dtype=np.float32)
+        through = middles[rng.integers(len(self.own), size=n)]
         beyond = np.empty((n, len(self.own)), bool)
         for rows in self._pieces(n):
-            offsets = sum(
-                normals[rows, i, None] * (self.middles[:, i] - through[rows, i, None])
-                for i in range(3)
-            )
-            np.greater(offsets, 0.0, out=beyond[rows])
+            # Written out: a matrix product might add up differently on another number of threads.
+            x, y, z = (middles[:, i] * normals[rows, i, None] for i in range(3))
+            x += y
+            x += z
+            a, b, c = (through[rows] * normals[rows]).T
+            np.greater(x, (a + b + c)[:, None], out=beyond[rows])
         return beyond
 
     def _pieces(self, n: int) -> Iterator[slice]:
         """n genomes, a few at a time: their springs fit the cache."""
-        step = max(1, 16384 // len(self.own))
+        step = max(1, 32768 // len(self.own))
         return (slice(first, first + step) for first in range(0, n, step))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
@@ -18,7 +19,9 @@ __all__ = [
     "Genomes",
     "Interval",
     "ListGenomes",
+    "coins",
     "folded",
+    "sparse",
 ]
 
 Genomes = Any
@@ -100,6 +103,30 @@ def folded(genes: np.ndarray, circular: np.ndarray | bool = False) -> np.ndarray
     """Bring genes back into [0, 1]: those on a circle go round, the others are reflected."""
     reflected = np.abs(genes - 2.0 * np.round(0.5 * genes))
     return np.where(circular, genes - np.floor(genes), reflected).astype(genes.dtype)
+
+
+def coins(shape: tuple[int, ...], rng: np.random.Generator) -> np.ndarray:
+    """Fair coins: bool, a bit of the generator each."""
+    count = math.prod(shape)
+    drawn = np.frombuffer(rng.bytes(-(-count // 8)), np.uint8)
+    return np.unpackbits(drawn, count=count).reshape(shape).view(bool)
+
+
+def sparse(shape: tuple[int, int], rate: float, rng: np.random.Generator) -> np.ndarray:
+    """Coins that come up with a chance of `rate`, and at least one in each row: bool.
+
+    Drawn are the gaps between those that come up: for small rates far fewer than there are coins.
+    """
+    rows, columns = shape
+    found, last = np.zeros(rows * columns, bool), -1
+    while last < len(found) and rate > 0.0:
+        mean = rate * (len(found) - last)
+        places = last + np.cumsum(rng.geometric(rate, int(mean + 4.0 * mean**0.5) + 8))
+        found[places[places < len(found)]] = True
+        last = int(places[-1])
+    found = found.reshape(shape)
+    found[np.arange(rows), rng.integers(columns, size=rows)] = True
+    return found
 
 
 class ArrayGenomes:

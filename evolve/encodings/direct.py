@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from evolve.encodings.actuation import ActuationSettings, FixedBody
-from evolve.encodings.base import ArrayGenomes, EncodingSettings, folded
+from evolve.encodings.base import ArrayGenomes, EncodingSettings, coins, folded, sparse
 
 if TYPE_CHECKING:
     import warp_springs as ws
@@ -62,31 +62,37 @@ class DirectEncoding(FixedBody, ArrayGenomes):
         Each mutation changes a random choice of the kinds of gene. All but phases are reflected at
         their bounds.
         """
-        n, kinds_of = len(genomes), self.kinds
+        n, kinds_of, own = len(genomes), self.kinds, len(self.own)
         in_region = rng.random(n) < self.settings.region_mutation
-        chosen = np.where(in_region[:, None], self.balls(n, rng), self._scattered(n, rng))
-        kinds = rng.random((n, kinds_of)) < 0.5
+        chosen = np.empty((n, own), bool)
+        where = np.flatnonzero(in_region), np.flatnonzero(~in_region)
+        chosen[where[0]] = self.balls(len(where[0]), rng)
+        chosen[where[1]] = sparse((len(where[1]), own), self.settings.mutation_rate, rng)
+        kinds = coins((n, kinds_of), rng)
         kinds[np.arange(n), rng.integers(kinds_of, size=n)] = True
-        shared = rng.standard_normal((n, kinds_of), dtype=np.float32)
-        # Few springs change: only their genes are shifted, as K rows of all kinds.
-        rows, springs = np.divmod(np.flatnonzero(chosen), chosen.shape[1])
-        shift = rng.standard_normal((len(rows), kinds_of), dtype=np.float32)
-        of_region = np.flatnonzero(in_region[rows])
-        shift[of_region] = shared[rows[of_region]]
         bold = np.exp(self.settings.mutation_spread * rng.standard_normal(n, dtype=np.float32))
         step = np.float32(self.settings.mutation_step) * bold
-        shift *= (step[:, None] * kinds)[rows]
-        genes = genomes[rows, :, springs] + shift
+        shared = rng.standard_normal((n, kinds_of), dtype=np.float32)
+        # Few genes change: only these are shifted. A line is one kind of gene of one genome.
+        places = np.flatnonzero(chosen[:, None] & kinds[:, :, None])
+        line = places // own
+        genes = shared.ravel()[line]
+        scattered = np.flatnonzero(np.repeat(~in_region, kinds_of)[line])
+        genes[scattered] = rng.standard_normal(len(scattered), dtype=np.float32)
+        genes *= np.repeat(step, kinds_of)[line]
         mutants = genomes.copy()
-        mutants[rows, :, springs] = folded(genes, self.on_circle)
+        genes += mutants.ravel()[places]
+        mutants.ravel()[places] = folded(genes, np.tile(self.on_circle, n)[line])
         return mutants
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Take every spring, with all its genes, from a[i] or from b[i]."""
         n, springs = len(a), self.genome_shape[1]
         by_plane = rng.random(n) < self.settings.region_crossover
-        coins = rng.random((n, springs), dtype=np.float32) < 0.5
-        from_b = np.where(by_plane[:, None], self.half_spaces(n, rng), coins)
+        where = np.flatnonzero(by_plane), np.flatnonzero(~by_plane)
+        from_b = np.empty((n, springs), bool)
+        from_b[where[0]] = self.half_spaces(len(where[0]), rng)
+        from_b[where[1]] = coins((len(where[1]), springs), rng)
         # By bits: a branch for each of a million random coins takes seven times as long.
         a, b = a.view(np.int32), b.view(np.int32)
         child = a ^ b
@@ -96,9 +102,7 @@ class DirectEncoding(FixedBody, ArrayGenomes):
 
     def express(self, genomes: np.ndarray) -> ws.Variants:
         """Build the robots: one body, n controllers."""
-        genes = np.asarray(genomes, dtype=np.float64)
-        kinds = (REST, AMPLITUDE, PHASE, STIFFNESS)
-        return self.actuated(*(genes[:, kind] for kind in kinds))
+        return self.actuated(*(genomes[:, k] for k in (REST, AMPLITUDE, PHASE, STIFFNESS)))
 
     def distance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Mean difference of the genes, shape (n,), scaled so that uniform genes differ by 1."""
@@ -107,10 +111,3 @@ class DirectEncoding(FixedBody, ArrayGenomes):
         # Two uniform numbers differ by 1/3 on average on a line, by 1/4 on a circle.
         gaps *= np.where(self.on_circle, 4.0, 3.0)[:, None]
         return gaps.mean(axis=(1, 2))
-
-    def _scattered(self, n: int, rng: np.random.Generator) -> np.ndarray:
-        """For each of n genomes, independent springs and at least one: shape (n, R), bool."""
-        chosen = rng.random((n, self.genome_shape[1]), dtype=np.float32)
-        chosen = chosen < np.float32(self.settings.mutation_rate)
-        chosen[np.arange(n), rng.integers(self.genome_shape[1], size=n)] = True
-        return chosen

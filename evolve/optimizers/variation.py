@@ -44,11 +44,12 @@ class Breeder(PopulationOptimizer):
         crossed = streams(turn, Role.CROSSOVER, 1).random(n) < settings.crossover_rate
         ids = pool.ids[parents]
         ids[~crossed, 1] = NOBODY
-        mothers = encoding.take(pool.genomes, parents[:, 0])
-        fathers = encoding.take(pool.genomes, parents[:, 1])
-        young = encoding.cross(mothers, fathers, streams(turn, Role.CROSSOVER))
-        single = np.flatnonzero(~crossed)
-        encoding.overwrite(young, single, mothers, single)
+        young, both = encoding.take(pool.genomes, parents[:, 0]), np.flatnonzero(crossed)
+        if len(both):
+            mothers = encoding.take(young, both)
+            fathers = encoding.take(pool.genomes, parents[both, 1])
+            children = encoding.cross(mothers, fathers, streams(turn, Role.CROSSOVER))
+            encoding.overwrite(young, both, children, np.arange(len(both)))
         mutants = encoding.mutate(young, streams(turn, Role.MUTATION))
         coins = streams(turn, Role.MUTATION, 1).random(n)
         spared = np.flatnonzero(crossed & (coins >= settings.mutation_rate))
