@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import os
 import time
@@ -116,7 +115,7 @@ class Simulation:
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
         layout_of = functools.partial(choose, layout, place, precision)
-        self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies)
+        self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies, self.threads)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)
         self._audits = [Audit(piece, self._batch, self.limits.gain) for piece in self._slices]
@@ -323,7 +322,7 @@ class Simulation:
             energy=_energy(tapes, len(self.robots)),
             spring_evaluations=int((slots.springs * steps).sum()) * EVALUATIONS[self.integrator],
             wall_time=wall_time,
-            _slots=copy.deepcopy(slots),  # robots may move later
+            _slots=slots.copy(),  # robots may move later
             _worn=self._worn(),
             _signals={i: s for p in self._pilots if p is not None for i, s in p.signals().items()},
             _positions=buffers["seen_positions"].copy(),

@@ -216,7 +216,7 @@ def coefficients(
     the Newton step of the inverse square root, see ``kernels.law``.
     """
     k = fields["stiffness"][order]
-    table = np.empty((len(k), 4 if actuated else 2))
+    table = np.empty((4 if actuated else 2, len(k))).T  # each column in one piece
     table[:, 0] = k
     half = 0.5 * k
     np.multiply(half, fields["rest_length"][order], out=table[:, 1])
@@ -224,10 +224,14 @@ def coefficients(
         kb = half * fields["amplitude"][order]
         # cos c and sin c by the tangent of half the angle, which NumPy computes in vectors: a tenth
         # of the time, the same to the last bit or two.
-        t = np.tan(0.5 * fields["phase"][order])
-        kb /= 1.0 + t * t
-        np.multiply(kb, 1.0 - t * t, out=table[:, 2])
-        np.multiply(kb, 2.0 * t, out=table[:, 3])
+        t = 0.5 * fields["phase"][order]
+        np.tan(t, out=t)
+        square = t * t
+        kb /= 1.0 + square
+        np.subtract(1.0, square, out=square)
+        np.multiply(kb, square, out=table[:, 2])
+        t *= 2.0
+        np.multiply(kb, t, out=table[:, 3])
     return table
 
 
@@ -306,6 +310,8 @@ def breathes(strip: Strip) -> np.ndarray:
 
 def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The largest of each run of ``counts`` non-negative values; 0 for an empty run."""
+    if len(counts) and (counts == counts[0]).all():  # as of robots of one topology
+        return values.reshape(len(counts), counts[0]).max(axis=1, initial=0.0).astype(np.float64)
     found = np.zeros(len(counts))
     some = counts > 0
     if some.any():
@@ -335,14 +341,14 @@ def lane_major(
             return values.ravel()
         out[:] = values.ravel()
         return out
-    full, size = robots // width, values.size // robots
-    rows, left = values.reshape(robots, size), robots % width
-    shape = full + (left > 0), size, width
+    full, left, size = robots // width, robots % width, (len(values) // robots, *values.shape[1:])
+    rows = values.reshape(robots, *size)
+    shape = full + (left > 0), *size, width
     block = np.empty(shape, values.dtype) if out is None else out.reshape(shape)
-    block[:full] = rows[: full * width].reshape(full, width, size).transpose(0, 2, 1)
+    block[:full] = np.moveaxis(rows[: full * width].reshape(full, width, *size), 1, -1)
     if left:
-        block[full, :, :left] = rows[full * width :].T
-        block[full, :, left:] = rows[-1][:, None]
+        block[full, ..., :left] = np.moveaxis(rows[full * width :], 0, -1)
+        block[full, ..., left:] = rows[-1][..., None]
     return block.ravel()
 
 

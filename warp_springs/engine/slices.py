@@ -6,7 +6,7 @@ import copy
 import functools
 import threading
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ import warp as wp
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.engine.audit import AUDIT_EVERY, Audit, flow_places
 from warp_springs.engine.control import Pilot, Reach
+from warp_springs.engine.crew import crew
 from warp_springs.engine.crowd import Crowd, crowds
 from warp_springs.engine.packing import aligned
 from warp_springs.engine.ranks import Ranks
@@ -30,6 +31,8 @@ SLICES_PER_THREAD = 4
 LAUNCH_WORK = 1e8
 #: Values between the scratch blocks of two slices: threads then never share a cache line.
 SCRATCH_GAP = 256
+#: No robots.
+NOBODY = np.zeros(0, np.int64)
 
 
 def cut(
@@ -183,17 +186,14 @@ class Tape:
     energies: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        def inside(robots: np.ndarray) -> np.ndarray:
-            bundle = self.slots.bundle[robots]
-            return robots[(bundle >= self.slice.first) & (bundle < self.slice.last)]
-
         count = len(self.frame_steps)
         # Who records nothing need not know whom it steps.
-        everyone = np.arange(len(self.slots.bundle) if self.energy else 0)
-        self.members = inside(everyone)
-        self.recorded = inside(self.recorded)
-        state = self.slots.state_indices(self.recorded)
-        sizes = 3 * self.slots.masses[self.recorded]
+        self.members = self._inside(np.arange(len(self.slots.bundle)) if self.energy else NOBODY)
+        self.recorded = self._inside(self.recorded)
+        state, sizes = NOBODY, NOBODY
+        if len(self.recorded):
+            state = self.slots.state_indices(self.recorded)
+            sizes = 3 * self.slots.masses[self.recorded]
         self.frames = Reel(count, self.recorded, sizes, state)
         asked = {} if self.pilot is None else self.pilot.outputs
         some = [robot for robot in self.recorded.tolist() if robot in asked]
@@ -203,15 +203,26 @@ class Tape:
         self.energies = np.empty((count if self.energy else 0, len(self.members), ENERGIES))
         self._find_lanes()
 
+    def _inside(self, robots: np.ndarray) -> np.ndarray:
+        """Those of some robots that the slice steps."""
+        if not len(robots):
+            return NOBODY
+        bundle = self.slots.bundle[robots]
+        return robots[(bundle >= self.slice.first) & (bundle < self.slice.last)]
+
     def _find_lanes(self) -> None:
-        self._lanes = self.slots.lane_indices(self.members, ENERGIES)
-        bundles = np.unique(self.slots.bundle[self.recorded]).astype(np.int32)
-        self._which = None if self.energy else _on_device(bundles)
+        self._which = None
+        if self.energy:
+            self._lanes = self.slots.lane_indices(self.members, ENERGIES)
+        elif len(self.recorded):
+            bundles = np.unique(self.slots.bundle[self.recorded])
+            self._which = _on_device(bundles.astype(np.int32))
 
     def _close_ranks(self) -> None:
         """Let robots move to where those that were stopped leave a lane."""
         if self.slice.ranks.close(self.slots):
-            self.frames.move(self.slots.state_indices(self.recorded))
+            if len(self.recorded):
+                self.frames.move(self.slots.state_indices(self.recorded))
             self._find_lanes()
 
     def run(self, first: int, last: int, stop: threading.Event) -> None:
@@ -290,19 +301,20 @@ def run_all(tapes: Sequence[Tape], first: int, last: int, threads: int, progress
     stop = threading.Event()
     tapes = sorted(tapes, key=lambda tape: -tape.slice.work)
     total = (last - first) * sum(tape.slice.work for tape in tapes)
-    with ThreadPoolExecutor(min(threads, len(tapes))) as pool:
-        try:
-            for turn in _turns(tapes):
-                pending = {pool.submit(tape.run, first, last, stop) for tape in turn}
-                while pending:
-                    done, pending = wait(pending, timeout=0.1)
-                    for future in done:
-                        future.result()
-                    if progress is not None and total:
-                        progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
-        except BaseException:
-            stop.set()
-            raise
+    pending: set[Future] = set()
+    try:
+        for turn in _turns(tapes):
+            pending = {crew(threads).submit(tape.run, first, last, stop) for tape in turn}
+            while pending:
+                done, pending = wait(pending, timeout=0.1)
+                for future in done:
+                    future.result()
+                if progress is not None and total:
+                    progress(sum(tape.done * tape.slice.work for tape in tapes) / total)
+    except BaseException:
+        stop.set()
+        wait(pending)
+        raise
 
 
 def _turns(tapes: Sequence[Tape]) -> list[list[Tape]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,11 @@ class Slots:
     springs: np.ndarray
     first: np.ndarray
     rows: np.ndarray
+
+    def copy(self) -> Slots:
+        """A copy that stays as it is when robots move."""
+        moving = {name: getattr(self, name).copy() for name in ("bundle", "lane", "state")}
+        return replace(self, **moving, first_lane=self.first_lane.copy())
 
     def unpack(self, buffer: np.ndarray, robot: int) -> np.ndarray:
         """Block (M, 3) of one robot in a buffer of positions or velocities, float64."""
