@@ -110,11 +110,13 @@ class Search:
     def tell(self, seconds: float) -> Generation:
         """Wait for the scores of the candidates asked for first, and tell them."""
         asked, number = self.waiting.popleft(), self.optimizer.generation
+        blobs, scores = asked.blobs, None
         if len(asked.simulated):
-            rows = asked.first + np.arange(len(asked.simulated))
-            fresh = [asked.blobs[i] for i in asked.simulated]
-            self.judge.learn(fresh, asked.ticket().take(rows))
-        scores = replace(self.judge.recall(asked.blobs, asked.simulated), wall_time=seconds)
+            scores = asked.ticket().take(asked.first + np.arange(len(asked.simulated)))
+            self.judge.learn([blobs[i] for i in asked.simulated.tolist()], scores)
+        if len(asked.simulated) < len(blobs):
+            scores = self.judge.recall(blobs, asked.simulated)
+        scores = replace(scores, wall_time=seconds)
         self.optimizer.tell(asked.candidates, scores)
         self.cost += int(scores.spring_evaluations.sum())
         return Generation(number, asked.candidates, asked.blobs, scores, 0.0)
@@ -195,7 +197,10 @@ def _submit(
     new = [search.judge.unknown(own) for search, own in zip(searches, blobs, strict=True)]
     encoding, ticket = searches[0].encoding, _nothing
     if sum(map(len, new)):
-        parts = [encoding.take(a.genomes, rows) for a, rows in zip(asked, new, strict=True)]
+        parts = [
+            a.genomes if len(rows) == len(a) else encoding.take(a.genomes, rows)
+            for a, rows in zip(asked, new, strict=True)
+        ]
         fresh = [own[i] for own, rows in zip(blobs, new, strict=True) for i in rows]
         ticket = searches[0].simulator.submit(encoding.concatenate(parts), fresh)
     first = 0

@@ -16,7 +16,6 @@ import numpy as np
 from warp_springs.body.elements import NONE
 from warp_springs.body.variants import Variants
 from warp_springs.engine.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
-from warp_springs.engine.crew import each
 from warp_springs.engine.curve import ranges
 from warp_springs.engine.element_packing import (
     PACKED_ELEMENTS,
@@ -108,7 +107,6 @@ class Batch:
         method: How they are stepped.
         layout_of: The layout of a robot with so many masses.
         bodies: For robots that are worlds of several: the body of each mass, shape (M,).
-        threads: CPU threads to use.
 
     Attributes:
         slots: Where each robot lives.
@@ -130,10 +128,9 @@ class Batch:
         method: Method,
         layout_of: Callable[[int], str] = lambda masses: "lanes",
         bodies: Mapping[int, np.ndarray] | None = None,
-        threads: int = 1,
     ) -> None:
         self.robots, self._bodies = robots, bodies or {}
-        self._scene, self._method, self._threads = scene, method, threads
+        self._scene, self._method = scene, method
         self._parts: dict[str, list[np.ndarray]] = {name: [] for name in PACKED}
         self._sizes = dict.fromkeys(PACKED, 0)
         self._tables: list[np.ndarray] = []
@@ -244,7 +241,7 @@ class Batch:
     def _spring_tables(
         self, strip: Strip, width: int, order: np.ndarray | slice, actuated: bool
     ) -> tuple[int, np.ndarray, np.ndarray]:
-        """The coefficients of the springs, a few bundles at a time on each thread.
+        """The coefficients of the springs, a few bundles at a time, which fit the cache.
 
         Returns:
             How many a spring has; all of them, lane by lane; and which robots they are not finite
@@ -263,8 +260,7 @@ class Batch:
         invalid = np.zeros(n, bool)
         columns = traits_of(strip.elements).columns(actuated)
         lanes = aligned_empty(columns * int(ends[-1]), real_dtype(self._method.precision))
-
-        def fill(first: int) -> None:
+        for first in range(0, n, bundles * width):
             last = min(first + bundles * width, n)
             part = slice(start[first], start[last])
             part = part if isinstance(order, slice) else order[part]
@@ -276,8 +272,6 @@ class Batch:
                 invalid[first:last] = not_finite(cast, strip.counts[first:last])
             here = lanes[columns * ends[first] : columns * ends[last]]
             lane_major(cast, last - first, width, here)
-
-        each(fill, range(0, n, bundles * width), self._threads)
         return columns, lanes, invalid
 
     def _pack_elements(

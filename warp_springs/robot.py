@@ -298,11 +298,15 @@ class Robot(Placing, Verbs):
 
         return join(self, other, merge, tolerance)
 
-    def variants(self, **stacked: ArrayLike) -> Variants:
-        """N robots that share this body and differ in some fields: see `Variants`."""
+    def variants(self, *, copy: bool = True, **stacked: ArrayLike) -> Variants:
+        """N robots that share this body and differ in some fields: see `Variants`.
+
+        With ``copy=False`` arrays of float64 are not copied where that can be avoided, but made
+        read-only: for whoever made them for these robots alone.
+        """
         from warp_springs.body.variants import Variants
 
-        return Variants(self, stacked)
+        return Variants(self, stacked, copy)
 
     # -- files --------------------------------------------------------------------------------
 

@@ -115,7 +115,7 @@ class Simulation:
         self._interrupted = False
         self._method = Method(self.dt, auto, integrator, precision, contact_substeps, self.limits)
         layout_of = functools.partial(choose, layout, place, precision)
-        self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies, self.threads)
+        self._batch = Batch(self.robots, self.scene, self._method, layout_of, bodies)
         self._buffers = self._allocate()
         self._slices = cut(self._batch, self._buffers, self.threads, place)
         self._audits = [Audit(piece, self._batch, self.limits.gain) for piece in self._slices]

@@ -210,20 +210,26 @@ def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndar
     w = 1.0 / fields["masses"]
     if "bond_table" in fields:  # what is held may be as good as infinitely heavy
         w = np.where((fields["bond_table"][:, :3] == 1.0).all(axis=1), w, 0.0)
-    certain = np.sqrt(largest(_softest(fields) * _sum_of_ends(strip, w), strip.counts))
+    ends = _sum_of_ends(strip, w)
+    squares = _softest(fields).reshape(-1, ends.shape[1]) * ends if ends.size else np.zeros(0)
+    certain = np.sqrt(largest(squares.ravel(), strip.counts))
     return certain * dt > _limit(0.0 * certain, integrator)
 
 
 def _sum_of_ends(strip: Strip, values: np.ndarray) -> np.ndarray:
-    """What the two masses of each spring have together, from values of all masses, flat."""
+    """What the two masses of each spring have together, from values of all masses.
+
+    Robots of one topology have a row each, (n, S), or (1, S) where all have the same; others are
+    one row.
+    """
     if not strip.shared:
         start, end = strip.ends
-        return values[start] + values[end]
+        return (values[start] + values[end])[None]
     start, end = strip.springs.T
     rows = values.reshape(len(strip.ids), -1)
     if (rows == rows[0]).all():  # the controllers of one body
-        return np.tile(rows[0, start] + rows[0, end], len(rows))
-    return (rows[:, start] + rows[:, end]).ravel()
+        rows = rows[:1]
+    return rows[:, start] + rows[:, end]
 
 
 def _positive(values: np.ndarray) -> np.ndarray:

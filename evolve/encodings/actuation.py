@@ -135,7 +135,7 @@ class FixedBody:
             if name not in ("omega", "weights"):
                 value = fields[name] = np.array(value)
                 value[:, passive] = getattr(self.body, name)[passive] if name in OWN else 0.0
-        return self.body.variants(**fields)
+        return self.body.variants(copy=False, **fields)
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Values of the springs that have genes, (n, R, ...), for every spring, (n, S, ...)."""

@@ -202,12 +202,17 @@ class _Two:
     def taken(self, encoding: Encoding, indices: np.ndarray) -> Genomes:
         """The genomes at `indices`, in that order."""
         of_second = indices >= len(self.first)
-        place = np.where(of_second, indices - len(self.first), indices)
-        if not len(self.first) or of_second.all():
-            return encoding.take(self.second, place)
-        rows = np.flatnonzero(of_second)
-        found = encoding.take(self.first, np.where(of_second, 0, place))
-        encoding.overwrite(found, rows, self.second, place[rows])
+        parts = [
+            (self.first, ~of_second, indices),
+            (self.second, of_second, indices - len(self.first)),
+        ]
+        # First as if all were of the part that most are of.
+        parts.sort(key=lambda part: -np.count_nonzero(part[1]))
+        (most, mine, place), (others, theirs, whence) = parts
+        found = encoding.take(most, np.where(mine, place, 0))
+        rows = np.flatnonzero(theirs)
+        if len(rows):
+            encoding.overwrite(found, rows, others, whence[rows])
         return found
 
 

@@ -130,12 +130,16 @@ def settled(given: Mapping[str, Any], to_check: Container[str]) -> dict[str, Any
 
 
 def checked(
-    name: str, value: ArrayLike, shape: tuple[int | None, ...], spread: bool = True
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+    spread: bool = True,
+    copy: bool = True,
 ) -> NDArray[Any]:
     """A value as the frozen array of a field; None in the shape stands for any count.
 
     With `spread` one number fills a field that has one number a row. Whether indices are in
-    range is not checked here.
+    range is not checked here. Without `copy` a contiguous array is made read-only where it is.
 
     Raises:
         ValueError: The value is no array of numbers, its shape or one of its values is wrong.
@@ -156,6 +160,9 @@ def checked(
         raise ValueError(f"{name}: shape {array.shape} given, {_text(shape)} expected")
     if field.rule in _LOW_ENOUGH:
         _check_values(name, array, field.rule)
+    if not copy and array.flags.c_contiguous:
+        array.flags.writeable = False
+        return array
     return array if ready else _frozen_copy(array)
 
 

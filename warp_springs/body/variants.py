@@ -36,6 +36,7 @@ class Variants(Sequence[Robot]):
             rest_length, amplitude, phase or material, (N,) omega; or arrays of `ws.Elements`,
             such as (N, S, H, 2) harmonics or (N, S) dashpot; or the (N, n_weights) weights of
             its controller. At least one.
+        copy: Whether arrays are copied, rather than made read-only where they are.
 
     Raises:
         TypeError: A field cannot be stacked.
@@ -45,7 +46,7 @@ class Variants(Sequence[Robot]):
 
     __slots__ = ("_body", "_count", "_stacked")
 
-    def __init__(self, body: Robot, stacked: Mapping[str, ArrayLike]) -> None:
+    def __init__(self, body: Robot, stacked: Mapping[str, ArrayLike], copy: bool = True) -> None:
         if not stacked:
             raise ValueError(f"variants need at least one stacked field of {', '.join(STACKABLE)}")
         arrays: dict[str, NDArray[Any]] = {}
@@ -57,7 +58,7 @@ class Variants(Sequence[Robot]):
                 arrays[name] = _checked_element(body, name, value, count)
             elif name in STACKABLE:
                 shape = (count, *np.shape(getattr(body, name)))
-                arrays[name] = checked(name, value, shape, spread=False)
+                arrays[name] = checked(name, value, shape, spread=False, copy=copy)
             else:
                 known = ", ".join((*STACKABLE, *ELEMENTS, WEIGHTS))
                 raise TypeError(f"variants cannot stack {name!r}, only {known}")

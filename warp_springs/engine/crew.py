@@ -1,16 +1,12 @@
-"""The threads of this process that step and pack robots: started once, they wait for work."""
+"""The threads of this process that step robots: started once, they wait for work."""
 
 from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
 
-__all__ = ["crew", "each"]
-
-Item = TypeVar("Item")
+__all__ = ["crew"]
 
 
 def crew(threads: int) -> ThreadPoolExecutor:
@@ -21,12 +17,3 @@ def crew(threads: int) -> ThreadPoolExecutor:
 @functools.cache
 def _crew(threads: int, process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="warp_springs")
-
-
-def each(function: Callable[[Item], object], items: Sequence[Item], threads: int) -> None:
-    """Call a function with each item, on so many threads."""
-    if threads < 2 or len(items) < 2:
-        for item in items:
-            function(item)
-    else:
-        list(crew(threads).map(function, items))

@@ -154,11 +154,32 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
         ``row``: for each topology its M + 1 row starts, counted from 0;
         ``partner``: for each topology the higher mass of each sorted spring.
     """
-    topologies = 1 if strip.shared else len(strip.ids)
-    masses, counts = strip.masses[:topologies], strip.counts[:topologies]
+    if not strip.shared:
+        return _sorted_rows(strip.masses, strip.counts, strip.springs)
+    order, row, partner = _rows_of_one(
+        int(strip.masses[0]), strip.springs.shape, strip.springs.tobytes()
+    )
+    if isinstance(order, np.ndarray):
+        order = (order + np.arange(len(strip.ids))[:, None] * len(order)).ravel()
+    return order, row, partner
+
+
+@functools.lru_cache(maxsize=64)
+def _rows_of_one(
+    masses: int, shape: tuple[int, int], springs: bytes
+) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]:
+    """The rows of one topology, which many generations of robots have."""
+    found = np.frombuffer(springs, np.int32).reshape(shape)
+    return _sorted_rows(np.array([masses]), np.array([len(found)]), found)
+
+
+def _sorted_rows(
+    masses: np.ndarray, counts: np.ndarray, springs: np.ndarray
+) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]:
+    """As `sort_rows`, of robots end to end with so many masses and springs each."""
     mass_start, spring_start = np.cumsum(masses) - masses, np.cumsum(counts) - counts
-    lower = np.minimum(*strip.springs.T) + np.repeat(mass_start, counts)
-    higher = np.maximum(*strip.springs.T)
+    lower = np.minimum(*springs.T) + np.repeat(mass_start, counts)
+    higher = np.maximum(*springs.T)
     step, along = np.diff(lower), np.diff(higher)
     in_rows = ((step > 0) | ((step == 0) & (along >= 0))).all()  # as the shapes make them
     order = slice(None) if in_rows else np.lexsort((higher, lower))
@@ -167,11 +188,8 @@ def sort_rows(strip: Strip) -> tuple[np.ndarray | slice, np.ndarray, np.ndarray]
     ends = np.cumsum(np.bincount(lower, minlength=masses.sum()))  # where the row of a mass ends
     row = np.zeros((masses + 1).sum(), np.int64)
     inner = np.ones(len(row), bool)
-    inner[mass_start + np.arange(topologies)] = False
+    inner[mass_start + np.arange(len(masses))] = False
     row[inner] = ends - np.repeat(spring_start, masses)
-    if strip.shared and not in_rows:
-        shift = np.arange(len(strip.ids)) * len(order)
-        order = (order + shift[:, None]).ravel()
     return order, row.astype(np.int32), partner.astype(np.int32)
 
 
@@ -182,8 +200,18 @@ def row_pairs(row: np.ndarray, partner: np.ndarray) -> np.ndarray:
     many springs of the first mass alone, of both masses to the same partners, and of the second
     mass alone follow each other. Springs between the two masses come first and are not counted.
     """
+    return np.frombuffer(_pairs(row.tobytes(), partner.tobytes()), np.int32)
+
+
+@functools.lru_cache(maxsize=64)
+def _pairs(row: bytes, partner: bytes) -> bytes:
+    """As `row_pairs`, of int32: those of a topology are the same in many generations."""
     code: list[int] = []
-    rows = [partner[a:b].tolist() for a, b in itertools.pairwise(row.tolist())]
+    ends, partners = (
+        np.frombuffer(row, np.int32).tolist(),
+        np.frombuffer(partner, np.int32).tolist(),
+    )
+    rows = [partners[a:b] for a, b in itertools.pairwise(ends)]
     for i in range(0, len(rows) - 1, 2):
         first, second = [j for j in rows[i] if j != i + 1], rows[i + 1]
         kinds, a, b = [], 0, 0
@@ -199,7 +227,7 @@ def row_pairs(row: np.ndarray, partner: np.ndarray) -> np.ndarray:
                 runs.append([0, 0, 0])
             runs[-1][kind] += 1
         code += [len(runs), *itertools.chain.from_iterable(runs)]
-    return np.array(code, np.int32)
+    return np.array(code, np.int32).tobytes()
 
 
 def _at(values: Sequence[int], index: int) -> float:
@@ -311,7 +339,7 @@ def breathes(strip: Strip) -> np.ndarray:
 def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The largest of each run of ``counts`` non-negative values; 0 for an empty run."""
     if len(counts) and (counts == counts[0]).all():  # as of robots of one topology
-        return values.reshape(len(counts), counts[0]).max(axis=1, initial=0.0).astype(np.float64)
+        return values.reshape(len(counts), counts[0]).max(axis=1, initial=0).astype(np.float64)
     found = np.zeros(len(counts))
     some = counts > 0
     if some.any():

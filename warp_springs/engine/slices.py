@@ -60,7 +60,8 @@ def cut(
             if not filled:
                 kinds = structs(group.features.precision)
                 filled = {kind.key.lower(): _filled(kind, buffers) for kind in kinds}
-            slices.append(Slice(group, first, last, load, largest, buffers, filled))
+            like = slices[-1] if first > group.first else None
+            slices.append(Slice(group, first, last, load, largest, buffers, filled, like))
     return slices
 
 
@@ -68,7 +69,8 @@ class Slice:
     """Bundles ``first`` to ``last - 1`` of one group, with scratch memory of their own.
 
     Launches are recorded when the slice is made, on one thread, which also loads the modules
-    (loading is not safe on several); threads only launch them.
+    (loading is not safe on several); threads only launch them. Those of a slice of the same group,
+    ``like``, are copied: to convert every argument again takes longer.
     """
 
     launch_work, gang, place = LAUNCH_WORK, False, "cpu"
@@ -82,6 +84,7 @@ class Slice:
         largest: tuple[int, int],
         buffers: Mapping[str, np.ndarray],
         filled: Mapping[str, object],
+        like: Slice | None,
     ) -> None:
         self.first, self.last, self.work = first, last, work
         self.buffers = buffers
@@ -98,18 +101,24 @@ class Slice:
         self._given = given | filled
         self._everything = given["which"]
         self._launches: dict[bool, tuple[wp.Launch, wp.Launch]] = {}
+        self._like = like
         self.prepare(ledger=False)
 
     def prepare(self, ledger: bool) -> None:
         """Use the kernels with or without the energy ledger from now on."""
         if ledger not in self._launches:
-            advance, observe = kernels(replace(self._features, ledger=ledger))
-            count = self.last - self.first
-            self._launches[ledger] = (
-                _recorded(advance, count, self._given),
-                _recorded(observe, count, self._given),
-            )
+            self._launches[ledger] = self._recorded(ledger)
         self._advance, self._observe = self._launches[ledger]
+
+    def _recorded(self, ledger: bool) -> tuple[wp.Launch, wp.Launch]:
+        count = self.last - self.first
+        if self._like is not None:
+            self._like.prepare(ledger)
+            own = {name: self._given[name] for name in ("scratch", "which", "first_bundle")}
+            advance, observe = self._like._launches[ledger]
+            return _copied(advance, count, own), _copied(observe, count, own)
+        advance, observe = kernels(replace(self._features, ledger=ledger))
+        return _recorded(advance, count, self._given), _recorded(observe, count, self._given)
 
     def reach(self, batch: Batch, robots: Sequence[int]) -> Reach:
         """Where controllers find some of its robots."""
@@ -327,6 +336,17 @@ def _recorded(kernel: wp.Kernel, dim: int, given: Mapping[str, object]) -> wp.La
     """A launch with the given arguments; the others are set before each launch."""
     inputs = [given.get(argument.label, 0) for argument in kernel.adj.args]
     return wp.launch(kernel, dim, inputs=inputs, device="cpu", record_cmd=True)
+
+
+def _copied(launch: wp.Launch, dim: int, changed: Mapping[str, object]) -> wp.Launch:
+    """The same launch with some other arguments."""
+    other = copy.copy(launch)
+    other.params, other.fwd_args = list(launch.params), list(launch.fwd_args)
+    other.set_dim(dim)
+    for index, argument in enumerate(launch.kernel.adj.args):
+        if argument.label in changed:
+            other.set_param_at_index(index, changed[argument.label])
+    return other
 
 
 def _filled(struct, buffers: Mapping[str, np.ndarray]):
