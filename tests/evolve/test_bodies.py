@@ -155,7 +155,7 @@ def test_whatever_a_genome_makes_a_run_goes_on(name):
 
 
 def test_a_body_search_finds_faster_robots():
-    search = Search(load("critter", {"population": 48, "generations": 8, "task.measure": 2.0}))
+    search = Search(load("critter", {"population": 48, "generations": 14, "task.measure": 2.0}))
     first = search.step().scores.fitness
     while not search.finished:
         search.step()

@@ -31,6 +31,10 @@ __all__ = ["Grouping", "Kind"]
 Kind = tuple[int, bool, str, Traits]
 
 
+#: Robots that are few of their kind, from which on they share bundles with others.
+MANY = 64
+
+
 class Grouping:
     """The robots of a batch in groups.
 
@@ -99,7 +103,7 @@ class Grouping:
         alone: dict[bool, list[int]] = defaultdict(list)
         gathered: list[Strip] = []
         by_hand: list[int] = []
-        for cohort in _cohorts(robots):
+        for cohort in _cohorts(robots, 1 if self._scene.obstacles else 4 * width):
             if isinstance(cohort, int):
                 lanes = self._layout_of(robots[cohort].n_masses) == "lanes"
                 (alone[robots[cohort].is_actuated] if lanes else by_hand).append(cohort)
@@ -147,8 +151,24 @@ class Grouping:
         for _, alike in self._alike(strip):
             part = strip.take(alike)
             for members, union in unions(part, width):
-                some = replace(part.take(members), union=union)
-                yield (1, PLAIN) if union is None else (width, MERGED), some
+                some = part.take(members)
+                if union is None:
+                    yield from self._few(some, width)
+                else:
+                    yield (width, MERGED), replace(some, union=union)
+
+    def _few(self, strip: Strip, width: int) -> Iterator[tuple[tuple[int, Traits], Strip]]:
+        """Robots that share bundles with none unlike them: those of one topology, and the rest."""
+        alike: dict[bytes, list[int]] = defaultdict(list)
+        for member, robot in enumerate(strip.ids.tolist()):
+            alike[self._robots[robot].topology].append(member)
+        for members in alike.values():
+            if len(members) > 1:
+                ids = strip.ids[members]
+                yield (width, PLAIN), Strip.alike(ids, [self._robots[i] for i in ids.tolist()])
+        alone = [members[0] for members in alike.values() if len(members) == 1]
+        if alone:
+            yield (1, PLAIN), strip.take(np.array(sorted(alone)))
 
     def _gathered(
         self, cohort: Strip, robots: Sequence[Robot]
@@ -197,9 +217,10 @@ def _wide_first(kind: Kind) -> tuple:
     return -width, layout, actuated, traits.name  # wide bundles first: alignment
 
 
-def _cohorts(robots: Sequence[Robot]) -> Iterator[Strip | int]:
-    """Robots of one topology and structure as one strip; a plain robot that shares them with none
-    by its index.
+def _cohorts(robots: Sequence[Robot], few: int) -> Iterator[Strip | int]:
+    """Robots of one topology and structure as one strip; plain ones that are few by their index.
+
+    Where many are alone, or few alike, they fill more lanes beside those that are nearly like them.
     """
     if isinstance(robots, Variants) and len(robots) > 1:
         yield Strip.variants(robots)
@@ -207,8 +228,10 @@ def _cohorts(robots: Sequence[Robot]) -> Iterator[Strip | int]:
     alike: dict[tuple[bytes, bytes], list[int]] = defaultdict(list)
     for index, robot in enumerate(robots):
         alike[robot.topology, robot.elements.structure].append(index)
+    rare = [m for m in alike.values() if len(m) <= few and robots[m[0]].elements is NONE]
+    most = few if sum(map(len, rare)) > MANY else 1
     for members in alike.values():
-        if len(members) == 1 and robots[members[0]].elements is NONE:
-            yield members[0]
+        if len(members) <= most and robots[members[0]].elements is NONE:
+            yield from members
         else:
             yield Strip.alike(members, [robots[i] for i in members])
