@@ -28,6 +28,7 @@ from evolve.errors import StoreError
 from evolve.judging.scores import Scores
 from evolve.optimizers.base import NOBODY, Candidates
 from evolve.record import Ancestor, Finalist, Record, Timing
+from evolve.tidying import Tidying
 
 if TYPE_CHECKING:
     from evolve.judging.second_look import SecondLook
@@ -41,7 +42,9 @@ class Store:
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.path = path
         self._connection = connection
+        self._tidying = Tidying(path)
         connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA wal_autocheckpoint = 0")  # see `Tidying`
 
     @classmethod
     def create(cls, path: Path, meta: Mapping[str, str], descriptors: Sequence[str]) -> Store:
@@ -98,6 +101,7 @@ class Store:
 
     def close(self) -> None:
         """Close the file; SQLite then folds its log into it."""
+        self._tidying.end()
         self._connection.close()
 
     def __enter__(self) -> Store:
@@ -145,6 +149,7 @@ class Store:
             executemany(f"INSERT INTO descriptor ({columns}) VALUES ({marks})", described)
             execute("DELETE FROM optimizer")
             executemany("INSERT INTO optimizer VALUES (?, ?, ?, ?)", map(_packed, state.items()))
+        self._tidying.look()
 
     def put_second_look(self, ids: Iterable[int], look: SecondLook) -> None:
         """Record what was seen at the second look, in place of any earlier one."""

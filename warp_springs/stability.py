@@ -213,7 +213,7 @@ def certainly_unstable(strip: Strip, dt: np.ndarray, integrator: str) -> np.ndar
     ends = _sum_of_ends(strip, w)
     squares = _softest(fields).reshape(-1, ends.shape[1]) * ends if ends.size else np.zeros(0)
     certain = np.sqrt(largest(squares.ravel(), strip.counts))
-    return certain * dt > _limit(0.0 * certain, integrator)
+    return certain * dt > _limit(np.zeros(1), integrator)
 
 
 def _sum_of_ends(strip: Strip, values: np.ndarray) -> np.ndarray:

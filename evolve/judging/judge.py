@@ -74,9 +74,11 @@ class Judge:
 
     def unknown(self, blobs: Sequence[bytes]) -> np.ndarray:
         """Which of some genomes, given by their bytes, must be simulated: their indices."""
-        last = len(blobs) - 1
+        keys = list(map(hash, blobs))
+        if len(set(keys)) == len(keys) and self._rows.keys().isdisjoint(keys):
+            return np.arange(len(keys))
         # Of equals the first: those before overwrite those behind.
-        first = dict(zip(map(hash, reversed(blobs)), range(last, -1, -1), strict=True))
+        first = dict(zip(reversed(keys), range(len(keys) - 1, -1, -1), strict=True))
         new = [index for key, index in first.items() if key not in self._rows]
         return np.array(sorted(new), np.intp)
 

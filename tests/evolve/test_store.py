@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import shutil
 import sqlite3
 
 import numpy as np
 import pytest
 
+from evolve import tidying
 from evolve.errors import StoreError
 from evolve.judging.scores import Scores
 from evolve.judging.second_look import SecondLook
@@ -222,3 +224,16 @@ def test_a_lock_is_exclusive_until_it_is_released(tmp_path):
         Lock(tmp_path / "run.lock")
     lock.release()
     Lock(tmp_path / "run.lock").release()
+
+
+def test_the_log_is_folded_into_the_file_while_it_is_open(tmp_path, monkeypatch):
+    monkeypatch.setattr(tidying, "LOG_SIZE", 0)
+    path = tmp_path / "run.sqlite"
+    with Store.create(path, {}, DESCRIPTORS) as store:
+        for number in range(3):
+            add(store, number)
+            store._tidying.end()
+        shutil.copy(path, tmp_path / "alone.sqlite")  # without the log beside it
+        with Store.open(tmp_path / "alone.sqlite") as alone:
+            assert alone.generations == 3
+            assert alone.digest() == store.digest()

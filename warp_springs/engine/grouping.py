@@ -207,8 +207,9 @@ class Grouping:
             return
         levels = self._method.levels(strip, self._scene)
         self.levels[strip.ids] = levels
-        self.substeps[strip.ids] = self._method.substeps(strip, self._scene, levels)
-        self.refused[strip.ids] = self._method.refused(strip, self._scene, levels)
+        substeps = self._method.substeps(strip, self._scene, levels)
+        self.substeps[strip.ids] = substeps
+        self.refused[strip.ids] = self._method.refused(strip, self._scene, levels, substeps)
         self._decided[strip.ids] = True
 
 

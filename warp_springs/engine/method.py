@@ -82,12 +82,15 @@ class Method:
         lightest = largest(1.0 / strip.fields["masses"], strip.masses)
         return np.sqrt(scene.stiffest_surface * lightest) * self.spans(levels)
 
-    def refused(self, strip: Strip, scene: Scene, levels: np.ndarray) -> np.ndarray:
-        """Robots that these steps cannot simulate, shape (n,) bool."""
+    def refused(
+        self, strip: Strip, scene: Scene, levels: np.ndarray, substeps: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Robots that these steps cannot simulate, shape (n,) bool; with sub-steps, if known."""
         refused = certainly_unstable(strip, self.dt / 2.0**levels, self.integrator)
         if not scene.stiffest_surface:
             return refused
-        phase = self._contact_phase(strip, scene, levels) / self.substeps(strip, scene, levels)
+        phase = self._contact_phase(strip, scene, levels)
+        phase /= self.substeps(strip, scene, levels) if substeps is None else substeps
         chosen = self.integrator != "euler" and self.contact_substeps is None
         return refused | (phase > (LARGEST_CONTACT_PHASE if chosen else 2.0))
 

@@ -292,7 +292,9 @@ def longest_springs(strip: Strip) -> np.ndarray:
     The largest of the initial lengths and of the rest lengths plus amplitudes.
     """
     fields = strip.fields
-    meant = largest(fields["rest_length"] + largest_change(fields), strip.counts)
+    meant = largest_change(fields)
+    meant += fields["rest_length"]
+    meant = largest(meant, strip.counts)
     positions, counts, springs = fields["positions"], strip.counts, strip.springs
     if strip.shared:
         poses = positions.reshape(len(counts), -1, 3)
@@ -349,9 +351,9 @@ def largest(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
 
 def not_finite(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Robots with an infinity or a NaN in their ``counts`` rows of ``values``, shape (n,) bool."""
-    good = np.isfinite(values)
-    if good.all():
+    if np.isfinite(values.sum()):  # as it is of numbers that are all finite, if none is immense
         return np.zeros(len(counts), bool)
+    good = np.isfinite(values)
     rows = ~good.reshape(len(values), -1).all(axis=1)
     return largest(rows.astype(float), counts) > 0.0
 
