@@ -141,6 +141,11 @@ class Collisions:
         check_number("Collisions.kinetic_friction", self.kinetic_friction, at_least=0.0)
         check_number("Collisions.damping", self.damping, at_least=0.0)
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether any coefficient is above zero."""
+        return self.static_friction > 0.0 or self.kinetic_friction > 0.0
+
 
 @dataclass(frozen=True)
 class Scene:

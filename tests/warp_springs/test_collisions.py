@@ -244,7 +244,7 @@ def test_restitution_and_duration_of_an_impact_are_those_of_a_damped_spring(rati
     options = SMOOTH | {"damping": ratio}
     collisions = ws.Collisions(thickness=0.01, stiffness=k, **options)
     scene = ws.Scene(collisions=collisions, **WEIGHTLESS)
-    robots = [point((0.1, 0.05, 0.011), (0.3, 0.0, -v)), plate(mass=1e6)]
+    robots = [point((0.1, 0.05, 0.011), (0.3, 0.0, -v)), plate(mass=0.05)]  # fixed: not light
     simulation = ws.Simulation(robots, scene, dt, world="together", layout=layout)
     result = simulation.run(0.015, fps=1 / dt, energy=True)
     speed = result.velocities(0)[0]
@@ -325,3 +325,66 @@ def test_a_folded_sheet_comes_to_rest_on_itself():
     assert total[-1] < total[0] and result.energy.residual[0, -1] < 0.02 * (total[0] - total[-1])
     falls = ws.Simulation(folded_sheet(), ws.Scene(ground=None, damping=5.0), dt=2e-4).run(1.5)
     assert falls.positions(0)[12:, 2].max() < 0.0  # through itself, without collisions
+
+
+def corner_on_corner(shift):
+    """Two cubes, one of which comes down with its corner on the upper corner of the other."""
+    cube = ws.shapes.cube(edge=0.1, mass=0.8, stiffness=1e4)
+    cube = cube.moved(-cube.center_of_mass)
+    low = cube.rotated(np.cross((1, 1, 1), (0, 0, 1)), np.arccos(1 / np.sqrt(3)))
+    high = low.rotated((1, 0, 0), np.pi).moved((*shift, 0.1 * np.sqrt(3) + 0.01))
+    return [low, high.moving((0, 0, -1.0))]
+
+
+@pytest.mark.parametrize(
+    ("layout", "integrator"),
+    [("lanes", "chin4"), ("lanes", "leapfrog"), ("lanes", "euler"), ("flat", "chin4")],
+)
+def test_corners_that_meet_make_no_energy_at_a_stable_step(layout, integrator):
+    # All triangles and edges around both corners push at once: as stiff as collisions ever are.
+    shifts = np.random.default_rng(0).normal(0, 0.0015, (6, 2))
+    robots = [cube for shift in (*shifts, (0, 0)) for cube in corner_on_corner(shift)]
+    pairs = np.arange(len(robots)) // 2
+    for collisions in (ws.Collisions(**SMOOTH), ws.Collisions(), ws.Collisions(damping=1.0)):
+        scene = ws.Scene(collisions=collisions, **WEIGHTLESS)
+        bound = ws.stable_dt(robots[0], scene, integrator)
+        for part, most in ((0.96, 1.6), (0.5, 1.1)):
+            options = {"integrator": integrator, "layout": layout, "limits": ws.Limits(gain=9.0)}
+            simulation = ws.Simulation(robots, scene, part * bound, world=pairs, **options)
+            energy = simulation.run(0.04, fps=500, energy=True).energy
+            assert np.ptp(energy.kinetic, axis=1).min() > 0.05  # they met
+            assert (energy.total / energy.total[:, :1]).max() < most
+            assert part > 0.5 or energy.gain.max() < 0.1
+    auto = ws.Simulation(robots, scene, integrator=integrator, layout=layout, world=pairs)
+    assert auto.robot_dt.max() <= 0.5 * bound
+
+
+@pytest.mark.parametrize("layout", ["lanes", "flat"])
+def test_a_bar_on_more_rails_than_friction_remembers_sticks_and_slides_all_the_same(layout):
+    mu, g, rails = 0.6, 9.81, 12  # friction remembers eight pairs of an edge
+    at = np.linspace(-0.55, 0.55, rails)
+    fixed = [
+        ws.Robot(masses=1.0, positions=[(x, -0.1, 0), (x, 0.1, 0)], springs=[(0, 1)], stiffness=1e4)
+        for x in at
+    ]
+    ends = [(-0.9, 0.0, 0.01), (0.9, 0.0, 0.01)]
+    bar = ws.Robot(masses=0.2, positions=ends, springs=[(0, 1)], stiffness=1e4)
+    rough = ws.Collisions(thickness=0.01, static_friction=mu, kinetic_friction=mu, damping=0.3)
+
+    def run(bar, slope, damping, duration):
+        tilted = (g * np.sin(slope), 0.0, -g * np.cos(slope))
+        scene = ws.Scene(gravity=tilted, ground=None, damping=damping, collisions=rough)
+        robots = [bar, *(rail.fixed() for rail in fixed)]
+        simulation = ws.Simulation(robots, scene, dt=1e-4, world="together", layout=layout)
+        return simulation, simulation.run(duration, fps=100, energy=True)
+
+    simulation, held = run(bar, 0.8 * np.arctan(mu), 20.0, 0.5)
+    before, after = held.positions(0)[:2], simulation.run(0.5).positions(0)[:2]
+    assert after == pytest.approx(before, abs=1e-7)
+    level = run(bar, 0.0, 20.0, 0.5)[1].positions(0)[:2]
+    slope = np.arctan(mu) + 0.2
+    _, slides = run(bar.replace(positions=level), slope, 0.0, 0.25)
+    assert slides.status[0] == ws.Status.OK and slides.energy.gain.max() < 0.01
+    way = slides.frames(0)[:, :2, 0].mean(axis=1)
+    fit = np.polyfit(slides.times, way, 2)
+    assert 2 * fit[0] == pytest.approx(g * (np.sin(slope) - mu * np.cos(slope)), rel=0.03)

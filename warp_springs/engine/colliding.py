@@ -8,7 +8,7 @@ from warp_springs.kernels.contact import GRIP, GRIPS
 from warp_springs.robot import Robot
 from warp_springs.scene import Collisions
 
-__all__ = ["CONTACT", "PACKED_COLLISIONS", "collision_buffers", "collision_counts", "no_grips"]
+__all__ = ["PACKED_COLLISIONS", "busiest", "collision_buffers", "collision_counts", "no_grips"]
 
 #: Buffers of collisions, and the columns of the table of bundles that say where.
 PACKED_COLLISIONS = {
@@ -24,8 +24,6 @@ PACKED_COLLISIONS = {
     "contacts": "contact",
 }
 
-#: Numbers of the contact of a robot, as the kernels read them.
-CONTACT = ("thickness", "stiffness", "static", "kinetic", "damping", "within")
 #: The part of the median length of its springs that surfaces keep as distance.
 THICKNESS = 0.04
 #: Pairs that the list of candidates has room for, for each feature that may collide.
@@ -40,9 +38,41 @@ def surface_edges(robot: Robot) -> np.ndarray:
     return np.unique(np.sort(sides, axis=1), axis=0)
 
 
-def no_grips(features: int) -> np.ndarray:
+def company(robot: Robot) -> tuple[int, int]:
+    """How many pairs touch at once where a corner meets a corner, or the middle of an edge.
+
+    Each corner meets the triangles around the other, and all edges of one meet all of the other. An
+    edge has the triangles on both sides, and meets all edges of the corner. The busiest corners of
+    the robot or world are counted, as if they met their like.
+    """
+    masses = robot.n_masses
+    triangles = np.bincount(robot.faces.ravel(), minlength=masses)
+    edges = np.bincount(surface_edges(robot).ravel(), minlength=masses)
+    t, e = int(triangles.max(initial=0)), int(edges.max(initial=0))
+    return max(1, 2 * t + e * e), max(1, 2 + e)
+
+
+def busiest(robot: Robot) -> float:
+    """Pairs that may push one mass at once, each by its weight: at most about so many.
+
+    At a corner that meets its like, see `company`; or where a mesh lies on a coarser one: on the
+    triangles around a mass, a third of the masses that fit there at the distance of the shortest
+    edge; on the edges, half of three that cross them at every such distance.
+    """
+    edges, masses = surface_edges(robot), robot.n_masses
+    corners, beside = company(robot)
+    if len(edges) == 0:
+        return float(corners)
+    lengths = np.linalg.norm(robot.positions[edges[:, 1]] - robot.positions[edges[:, 0]], axis=1)
+    finer = min(masses, lengths.max() / max(lengths.min(), np.finfo(float).tiny))
+    triangles = np.bincount(robot.faces.ravel(), minlength=1).max()
+    lying = 1.0 + triangles * min(finer**2 / 2, masses) / 3 + (beside - 2) * 1.5 * finer
+    return max(float(corners), lying)
+
+
+def no_grips(features: int, grips: int) -> np.ndarray:
     """For each feature its partners in friction, none, and whether it needed them, not."""
-    return np.tile(np.repeat(np.array([-1, 0], np.int32), GRIPS), features)
+    return np.tile(np.repeat(np.array([-1, 0], np.int32), grips), features)
 
 
 def collision_counts(robot: Robot) -> dict[str, int]:
@@ -79,6 +109,7 @@ def collision_buffers(
         collisions.kinetic_friction,
         collisions.damping,
         float(collisions.within),
+        *company(robot),
     )
     return {
         "triangles": robot.faces.ravel(),
@@ -87,7 +118,7 @@ def collision_buffers(
         "near_rows": rows,
         "nears": ends[:, 1],
         "pair_lists": pairs,
-        "grip_partners": no_grips(features),
+        "grip_partners": no_grips(features, GRIPS),
         "grips": np.zeros(GRIP * GRIPS * features),
         "listed_positions": np.zeros(3 * masses),
         "contacts": np.array(contact),

@@ -8,7 +8,7 @@ import numpy as np
 
 from warp_springs.engine.colliding import no_grips
 from warp_springs.engine.curve import along_curve, ranges
-from warp_springs.kernels.contact import GRIP, GRIPS
+from warp_springs.kernels.contact import CROWD_GRIPS, GRIP, NUMBERS
 from warp_springs.kernels.crowd_collisions import MEETING, ROOM
 
 if TYPE_CHECKING:
@@ -32,22 +32,21 @@ def collision_arrays(bodies: Bodies, lists: Lists) -> dict[str, np.ndarray]:
         slot = np.append(lists.slot[here] - lists.first[i], -1)
         body = _part(buffers["bodies"], table["body"][i], m)
         x = _part(buffers["positions"], table["state"][i], 3 * m).reshape(-1, 3)
-        order = _order(x.astype(np.float64), body, corners)
-        size = 1 << int(len(order) - 1).bit_length()
-        leaf = np.empty(len(order), np.int64)
-        leaf[order] = np.arange(len(order))
+        first = counts[:, i].copy()
+        leaf, size = _leaves(_order(x.astype(np.float64), body, corners), corners)
+        of_leaf = np.full(size, -1)
+        of_leaf[leaf] = first[0] + np.arange(len(leaf))
         near_row = _part(buffers["near_rows"], table["near_row"][i], m + 1)
         near["near_rows"].append(near_row)
         near["nears"].append(_part(buffers["nears"], table["near"][i], int(near_row[-1])))
         sizes = [len(corners), 2 * size, m + 1, int(near_row[-1])]
-        first = counts[:, i].copy()
         if i + 1 < n:
             counts[:, i + 1] = first + sizes
         triangles = table["triangles"][i]
         meetings[i] = [first[0], m, triangles, first[1], size, first[2], first[3], len(corners)]
         about = [np.full(len(corners), i), (corners >= 0).sum(axis=1)]
         rows.append(np.column_stack([*about, slot[corners], body[corners[:, 0]], leaf, corners]))
-        leaves.append(np.append(first[0] + order, np.full(size - len(order), -1)))
+        leaves.append(of_leaf)
     features = np.concatenate(rows)
     nodes = 2 * sum(map(len, leaves))
     return {
@@ -56,7 +55,7 @@ def collision_arrays(bodies: Bodies, lists: Lists) -> dict[str, np.ndarray]:
         "leaf_features": np.concatenate(leaves),
         "near_rows": np.concatenate(near["near_rows"]),
         "nears": np.concatenate(near["nears"]),
-        "contacts": buffers["contacts"][ranges(table["contact"], np.full(n, 6))],
+        "contacts": buffers["contacts"][ranges(table["contact"], np.full(n, len(NUMBERS)))],
         **_gathered(features, lists),
         "boxes": np.zeros(6 * nodes),
         "partners": np.zeros(ROOM * len(features), np.int32),
@@ -64,8 +63,8 @@ def collision_arrays(bodies: Bodies, lists: Lists) -> dict[str, np.ndarray]:
         "fitted_positions": np.full(4 * len(lists.home), np.nan),  # not yet
         "stale": np.zeros(n, np.int32),
         "touched": np.zeros(len(features), np.int32),
-        "grip_partners": no_grips(len(features)),
-        "grips": np.zeros(GRIP * GRIPS * len(features)),
+        "grip_partners": no_grips(len(features), CROWD_GRIPS),
+        "grips": np.zeros(GRIP * CROWD_GRIPS * len(features)),
         "feature_forces": np.zeros(12 * len(features)),
     }
 
@@ -96,6 +95,21 @@ def _order(x: np.ndarray, body: np.ndarray, corners: np.ndarray) -> np.ndarray:
     middles = [np.bincount(body, part) / np.maximum(count, 1) for part in share.T]
     of_body = along_curve(np.stack(middles, axis=1))[body[corners[:, 0]]]
     return np.lexsort((along_curve(middle), body[corners[:, 0]], of_body))
+
+
+def _leaves(order: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, int]:
+    """The leaf of each feature, and how many leaves a tree has, a power of two.
+
+    Masses, triangles and edges have a quarter of it each, since they only look for another kind, or
+    for edges: ``kernels.crowd_collisions`` begins at that quarter.
+    """
+    kind = np.array([0, 0, 2, 1])[(corners >= 0).sum(axis=1)]
+    quarter = 1 << int(np.bincount(kind).max() - 1).bit_length()
+    leaf = np.empty(len(order), np.int64)
+    for number in range(3):
+        own = order[kind[order] == number]
+        leaf[own] = number * quarter + np.arange(len(own))
+    return leaf, 4 * quarter
 
 
 def _gathered(features: np.ndarray, lists: Lists) -> dict[str, np.ndarray]:

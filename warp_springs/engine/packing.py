@@ -6,7 +6,7 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,7 @@ class Strip:
         fields: Flat arrays over all masses or all springs, and ``omega`` (n,).
         elements: Elements whose structure all robots share; their values are in ``fields``.
         union: How robots of different topologies share bundles, if they do.
+        bodies: The robots as they were given, or one of whose shape all are; not of a union.
     """
 
     ids: np.ndarray
@@ -67,20 +68,20 @@ class Strip:
     fields: dict[str, np.ndarray]
     elements: Elements = NONE
     union: Union | None = None
+    bodies: Sequence[Robot] = ()
 
     @classmethod
     def stacked(
         cls,
         ids: np.ndarray,
-        springs: np.ndarray,
         fields: dict[str, np.ndarray],
-        elements: Elements = NONE,
+        body: Robot,
     ) -> Strip:
-        """Robots of one topology and structure, from arrays with axis 0 the robot."""
+        """Robots of the topology and structure of a body, from arrays with axis 0 the robot."""
         n, masses = fields["masses"].shape
         flat = {name: values.reshape(-1, *values.shape[2:]) for name, values in fields.items()}
-        counts = np.full(n, masses), np.full(n, len(springs))
-        return cls(ids, *counts, springs, True, flat, elements)
+        counts = np.full(n, masses), np.full(n, body.n_springs)
+        return cls(ids, *counts, body.springs, True, flat, body.elements, bodies=(body,))
 
     @classmethod
     def variants(cls, robots: Variants) -> Strip:
@@ -88,14 +89,14 @@ class Strip:
         fields = {name: robots.array(name) for name in ALL_FIELDS}
         fields |= element_fields(robots, fields)
         body = robots[0]  # whose elements have the structure of all
-        return cls.stacked(np.arange(len(robots)), body.springs, fields, body.elements)
+        return cls.stacked(np.arange(len(robots)), fields, body)
 
     @classmethod
     def alike(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
         """Robots of one topology and structure, from a list."""
         fields = {name: np.stack([getattr(r, name) for r in robots]) for name in ALL_FIELDS}
         fields |= element_fields(robots, fields)
-        return cls.stacked(np.asarray(ids), robots[0].springs, fields, robots[0].elements)
+        return cls.stacked(np.asarray(ids), fields, robots[0])
 
     @classmethod
     def ragged(cls, ids: Sequence[int], robots: Sequence[Robot]) -> Strip:
@@ -108,7 +109,7 @@ class Strip:
         masses = np.array([robot.n_masses for robot in robots])
         counts = np.array([robot.n_springs for robot in robots])
         springs = np.concatenate([robot.springs for robot in robots])
-        return cls(np.asarray(ids), masses, counts, springs, False, fields)
+        return cls(np.asarray(ids), masses, counts, springs, False, fields, bodies=tuple(robots))
 
     def take(self, members: np.ndarray) -> Strip:
         """Some robots of a strip, in the order of `members`."""
@@ -122,7 +123,7 @@ class Strip:
             for name, values in self.fields.items()
         }
         ids = self.ids[members]
-        return Strip(ids, masses, counts, self.springs, True, fields, self.elements)
+        return replace(self, ids=ids, masses=masses, counts=counts, fields=fields)
 
     def _take_ragged(self, members: np.ndarray) -> Strip:
         masses, counts = self.masses[members], self.counts[members]
@@ -131,7 +132,9 @@ class Strip:
         fields = {name: self.fields[name][of_mass] for name in MASS_FIELDS}
         fields |= {name: self.fields[name][of_spring] for name in SPRING_FIELDS}
         fields["omega"] = self.fields["omega"][members]
-        return Strip(self.ids[members], masses, counts, self.springs[of_spring], False, fields)
+        bodies = tuple(self.bodies[i] for i in members.tolist())
+        springs = self.springs[of_spring]
+        return Strip(self.ids[members], masses, counts, springs, False, fields, bodies=bodies)
 
     @functools.cached_property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:

@@ -67,7 +67,7 @@ BUNDLE = (
     "grip_partner",
     "grip",
     "listed",  # [3 M]
-    "contact",  # see warp_springs.engine.colliding
+    "contact",  # see kernels.contact
     "triangles",  # T
     "edges",  # E
     "capacity",  # pairs
@@ -111,7 +111,7 @@ MODEL = {
     "bodies": np.int32,
     "near_rows": np.int32,
     "nears": np.int32,
-    "contacts": REAL,  # warp_springs.engine.colliding.CONTACT
+    "contacts": REAL,  # kernels.contact.NUMBERS
     "schedules": REAL,  # factor of the stiffness, and h = k / 2 times what is added to L0
     "reaches2": REAL,  # square of the length that stops a robot, m^2
     "quanta": REAL,  # the unit in which the origin of a robot moves, m; in mixed precision

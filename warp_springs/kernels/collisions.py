@@ -9,12 +9,13 @@ thickness and a margin of each other, and is looked up anew once a mass has move
 margin. More pairs than the list holds are looked at one by one.
 """
 
-from warp_springs.kernels.contact import CONTACT
+from warp_springs.kernels.contact import CONTACT, GRIPS
 
 __all__ = ["COLLIDING"]
 
 COLLIDING = (
-    CONTACT
+    f"const int GRIPS = {GRIPS};\n"
+    + CONTACT
     + r"""
 const int* const triangle = model.triangles.data + triangle_;
 const int* const edge = model.edges.data + edge_;
@@ -25,7 +26,7 @@ int* const pair_list = state.pair_lists.data + pair_list_;  // count, room for o
 int* const grip_partners = state.grip_partners.data + grip_partner_;
 scalar* const grips = state.grips.data + grip_;
 scalar* const listed_x = state.listed_positions.data + listed_;
-const scalar* const contact = model.contacts.data + contact_;  // see warp_springs.engine.colliding
+const scalar* const contact = model.contacts.data + contact_;  // see kernels.contact
 const int T = (int)triangles_, E = (int)edges_, CAPACITY = (int)capacity_;
 real collision_energy = zero, rub_power = zero, soft_power = zero;
 
@@ -139,10 +140,20 @@ auto push_pair = [&](const Vec* x, int f, int g, scalar time, bool rubs, bool ke
     for (int c = 0; c < 4; ++c) at[c] = point_at(x, masses[c]);
     Push pair;
     auto speed_of = [&](int c) -> Point { return point_at(v, masses[c]); };
-    auto inverse_of = [&](int c) -> scalar { return w[masses[c]][0]; };
+    auto inverse_of = [&](int c) -> scalar {
+        const wide* const free = bonds + 10 * masses[c];  // the diagonal of its projector
+        if (BOUND && free[0][0] == 0 && free[1][0] == 0 && free[2][0] == 0) return scalar(0);
+        return w[masses[c]][0];
+    };
     auto grip_of = [&](bool& fresh) -> scalar* {
-        const int e = find_grip(grip_partners + 2 * GRIPS * f, g, keeps, fresh);
-        return e < 0 ? nullptr : grips + GRIP * (GRIPS * (int64_t)f + e);
+        for (int attempt = 0; attempt < (keeps ? 4 : 2); ++attempt) {
+            const int owner = attempt % 2 ? g : f, partner = attempt % 2 ? f : g;
+            int* const partners = grip_partners + 2 * GRIPS * owner;
+            fresh = attempt >= 2;
+            const int e = fresh ? new_grip(partners, partner) : find_grip(partners, partner, keeps);
+            if (e >= 0) return grips + GRIP * (GRIPS * (int64_t)owner + e);
+        }
+        return nullptr;
     };
     if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, grip_of, keeps, pair)) return;
     collision_energy += pair.energy;

@@ -3,18 +3,34 @@
 Everything here is scalar: a pair at a time, in whatever lanes the rest of a layout computes.
 """
 
-__all__ = ["CONTACT", "GRIP", "GRIPS"]
+__all__ = ["CONTACT", "CROWD_GRIPS", "GRIP", "GRIPS", "GRIP_DAMPING", "NUMBERS"]
+
+#: Numbers of the contact of a robot: distance [m], stiffness [N/m], friction, damping as a part of
+#: critical damping, whether a body meets itself, and how many pairs touch at once where a corner
+#: meets a corner, or an edge.
+NUMBERS = (
+    "thickness",
+    "stiffness",
+    "static",
+    "kinetic",
+    "damping",
+    "within",
+    "corners",
+    "corner_and_edge",
+)
 
 #: Numbers that the friction of a pair remembers: weights of the points that met, how far apart they
 #: were then, and whether they slide.
 GRIP = 8
-#: Pairs of a feature whose friction is remembered at a time.
-GRIPS = 8
+#: Pairs of a feature whose friction is remembered at a time: in the lanes, where the other feature
+#: of a pair may remember it too, and in a crowd.
+GRIPS, CROWD_GRIPS = 8, 16
 #: Damping along the surface, as a part of critical damping.
 GRIP_DAMPING = 0.2
 
 CONTACT = (
-    f"const int GRIP = {GRIP}, GRIPS = {GRIPS};\nconst double GRIP_DAMPING = {GRIP_DAMPING};\n"
+    f"const int CONTACT_ROW = {len(NUMBERS)}, GRIP = {GRIP};\n"
+    f"const double GRIP_DAMPING = {GRIP_DAMPING};\n"
     + r"""
 struct Point { scalar x, y, z; };
 auto minus = [](Point a, Point b) -> Point { return Point{a.x - b.x, a.y - b.y, a.z - b.z}; };
@@ -75,13 +91,22 @@ auto nearest_of_segments = [=](const Point* a, const Point* b, scalar* wa, scala
     wb[0] = scalar(1) - t; wb[1] = t;
 };
 
+// How many pairs touch at once where this one does: all that share a corner which meets a corner,
+// or a corner which meets an edge; elsewhere it is alone.
+auto company = [=](const scalar* weights, int m, const scalar* contact) -> scalar {
+    int ends[2] = {0, 0};  // masses that each side's nearest point lies between
+    for (int c = 0; c < 4; ++c) ends[c >= m] += weights[c] != scalar(0);
+    if (ends[0] == 1 && ends[1] == 1) return contact[6];
+    return ends[0] + ends[1] == 3 ? contact[7] : scalar(1);
+};
+
 // What the temporary spring of a pair does: the force on the first feature, which the weights
 // share among the masses of both (negative: those of the second), its energy, and the power of its
 // friction and of its damping.
 struct Push { scalar weights[4]; Point force; scalar energy, rub, soft; };
 // The first feature has m masses and the second n, m + n = 4 of them `at` their places, with the
-// numbers of `contact` (see warp_springs.engine.colliding), in a kick of `time`; `rubs`: with
-// losses, which ask for the velocity and the inverse mass of each. `grip_of` finds what their
+// numbers of `contact` (see NUMBERS), in a kick of `time`; `rubs`: with losses, which ask for the
+// velocity and the inverse mass of each, zero where it is fixed. `grip_of` finds what their
 // friction remembers, which is kept up if it `keeps`. False: they do not touch.
 auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time, bool rubs,
                     auto speed_of, auto inverse_of, auto grip_of, bool keeps,
@@ -111,15 +136,18 @@ auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time,
         u.x += speed.x * weights[c]; u.y += speed.y * weights[c]; u.z += speed.z * weights[c];
         inverse += inverse_of(c) * weights[c] * weights[c];
     }
+    if (!(inverse > scalar(0))) return true;  // all are fixed
+    // Together they damp as much as one spring of all their stiffness would.
+    const scalar critical = scalar(2) * root_of(k / (inverse * company(weights, m, contact)));
     const scalar rate = inner(u, normal);
-    const scalar damping = scalar(2) * contact[4] * root_of(k / inverse);
+    const scalar damping = contact[4] * critical;
     scalar softer = -damping * rate;
     if (push + softer < scalar(0)) softer = -push;  // it never pulls
     pair.soft = -softer * (rate + softer * inverse * time * scalar(0.5));
     const Point slip = minus(u, grown(normal, rate));
     // The grip: a second spring holds together the two points that met first, along the surface. It
     // gives way beyond static friction and then slides on with kinetic friction.
-    const scalar load = push + softer, drag_along = scalar(2 * GRIP_DAMPING) * root_of(k / inverse);
+    const scalar load = push + softer, drag_along = scalar(GRIP_DAMPING) * critical;
     bool fresh = true;
     scalar* const grip = grip_of(fresh);
     scalar own[GRIP] = {};
@@ -149,17 +177,17 @@ auto pair_push = [=](const Point* at, int m, const scalar* contact, scalar time,
 };
 
 // What the friction of a feature remembers: for each of its grips the partner, -1 for none, and
-// whether it was needed in the present kick.
-auto find_grip = [](int* partners, int g, bool keeps, bool& fresh) -> int {
-    int free = -1;
-    for (int e = 0; e < GRIPS; ++e) {
-        if (partners[e] == g) { fresh = false; if (keeps) partners[GRIPS + e] = 1; return e; }
-        if (free < 0 && partners[e] < 0) free = e;
-    }
-    fresh = true;
-    if (!keeps) return -1;
-    if (free >= 0) { partners[free] = g; partners[GRIPS + free] = 1; }
-    return free;
+// whether it was needed in the present kick. A pair that finds no room is rubbed as if it had just
+// met: by damping along the surface, up to mu times its load.
+auto find_grip = [](int* partners, int g, bool keeps) -> int {
+    for (int e = 0; e < GRIPS; ++e)
+        if (partners[e] == g) { if (keeps) partners[GRIPS + e] = 1; return e; }
+    return -1;
+};
+auto new_grip = [](int* partners, int g) -> int {
+    for (int e = 0; e < GRIPS; ++e)
+        if (partners[e] < 0) { partners[e] = g; partners[GRIPS + e] = 1; return e; }
+    return -1;
 };
 auto let_go = [](int* partners) {
     for (int e = 0; e < GRIPS; ++e) {

@@ -5,16 +5,17 @@ their temporary springs do to its own masses; then each mass gathers from its fe
 computed from both sides, by the very same arithmetic: no atomics, the same bits with any number of
 threads.
 
-The features of a robot are the leaves of a binary tree of boxes, laid out once, bodies together and
-neighbours in space together. When a mass has moved by half of the margin since the tree was last
-fitted, it is fitted anew, and each feature lists those within thickness and margin of it; a list
-that does not fit is replaced by a walk through the tree. A feature that does not touch adds
-nothing, and the order of those that do is that of the tree: when a list was made does not matter.
+The features of a robot are the leaves of a binary tree of boxes, laid out once: masses, triangles
+and edges in a quarter each, there bodies together and neighbours in space together. When a mass has
+moved by half of the margin since the tree was last fitted, it is fitted anew, and each feature
+lists those within thickness and margin of it; a list that does not fit is replaced by a walk
+through the tree. A feature that does not touch adds nothing, and the order of those that do is that
+of the tree: when a list was made does not matter.
 
 What a layout must add: ``base_of(robot)``, where its positions begin in a buffer of quads.
 """
 
-from warp_springs.kernels.contact import CONTACT
+from warp_springs.kernels.contact import CONTACT, CROWD_GRIPS
 
 __all__ = [
     "COLLISION_JOBS",
@@ -42,7 +43,8 @@ auto touch_energy = [=](Slot) -> real { return zero; };
 """
 
 CROWD_COLLIDING = (
-    CONTACT
+    f"const int GRIPS = {CROWD_GRIPS};\n"
+    + CONTACT
     + f"const int FEATURE_ROW = {len(FEATURE)}, MEETING_ROW = {len(MEETING)};\n"
     + f"const int ROOM = {ROOM}, MARGIN = {MARGIN};\n"
     + r"""
@@ -71,7 +73,7 @@ auto joined = [=](const int* about, int i, int j) -> bool {
 auto may_meet = [=](const int* about, const int* f, const int* g) -> bool {
     if (f[1] + g[1] != 4) return false;
     if (f[5] != g[5]) return true;
-    if (model.contacts.data[6 * f[0] + 5] == scalar(0)) return false;
+    if (model.contacts.data[CONTACT_ROW * f[0] + 5] == scalar(0)) return false;
     for (int i = 0; i < f[1]; ++i)
         for (int j = 0; j < g[1]; ++j)
             if (joined(about, f[7 + i], g[7 + j])) return false;
@@ -118,7 +120,7 @@ auto each_near = [=](int f, auto found) {
     const scalar* const boxes = state.boxes.data + 6 * (long long)about[3];
     const int* const order = model.leaf_features.data + about[3] / 2;
     const scalar* const mine = boxes + 6 * (leaves + row[6]);
-    const scalar reach = model.contacts.data[6 * row[0]] * scalar(1 + MARGIN);
+    const scalar reach = model.contacts.data[CONTACT_ROW * row[0]] * scalar(1 + MARGIN);
     auto apart = [=](const scalar* box) -> bool {
         bool near = true;
         for (int c = 0; c < 3; ++c)
@@ -126,7 +128,7 @@ auto each_near = [=](int f, auto found) {
         return !near;
     };
     int stack[40], height = 0;
-    stack[height++] = 1;
+    stack[height++] = row[1] == 2 ? 6 : row[1] == 1 ? 5 : 4;  // edges, triangles, masses
     while (height > 0) {
         const int k = stack[--height];
         if (apart(boxes + 6 * k)) continue;
@@ -147,7 +149,7 @@ auto has_left = [=](const scalar* where, int base, int robot, int slot) -> bool 
     const Point now = quad_point(where, base + slot - first);
     const Point then = quad_point(state.fitted_positions.data, slot);
     const Point way = minus(now, then);
-    const scalar margin = model.contacts.data[6 * robot] * scalar(MARGIN * 0.5);
+    const scalar margin = model.contacts.data[CONTACT_ROW * robot] * scalar(MARGIN * 0.5);
     return !(inner(way, way) <= margin * margin);
 };
 auto remember = [=](const scalar* where, int base, int robot, int slot) {
@@ -184,12 +186,18 @@ auto push_feature = [=](int f, const scalar* where, int base, scalar time, bool 
             return Point{v[0], v[SLICE], v[2 * SLICE]};
         };
         auto inverse_of = [&](int c) -> scalar {
+            const int slot = first + slots_of[c];
+            const auto* const free = model.bonds.data  // the diagonal of its projector
+                + (long long)(slot / SLICE) * 10 * SLICE + lane_of_slot(slot % SLICE);
+            if (BOUND && free[0] == 0 && free[SLICE] == 0 && free[2 * SLICE] == 0) return scalar(0);
             return where[4 * (long long)(base + slots_of[c]) + 3];
         };
         Push pair;
-        const scalar* const contact = model.contacts.data + 6 * row[0];
+        const scalar* const contact = model.contacts.data + CONTACT_ROW * row[0];
         auto grip_of = [&](bool& fresh) -> scalar* {
-            const int e = find_grip(partners, g, keeps, fresh);
+            int e = find_grip(partners, g, keeps);
+            fresh = e < 0;
+            if (fresh && keeps) e = new_grip(partners, g);
             return e < 0 ? nullptr : state.grips.data + GRIP * (GRIPS * (long long)f + e);
         };
         if (!pair_push(at, m, contact, time, rubs, speed_of, inverse_of, grip_of, keeps, pair))

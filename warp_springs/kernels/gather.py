@@ -149,7 +149,7 @@ COLLISION_MODEL = {
     "leaf_features": np.int32,  # the leaves of the trees, -1 for padding
     "near_rows": np.int32,
     "nears": np.int32,
-    "contacts": REAL,  # see warp_springs.engine.colliding
+    "contacts": REAL,  # see kernels.contact
     "touch_rows": np.int32,  # where the features of the mass in each slot begin
     "touches": np.int32,  # three times the feature, plus its corner
 }
