@@ -24,6 +24,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
+import stability_hits
 import stability_limits
 import stability_maps
 import stability_rest
@@ -193,6 +194,11 @@ def _limits(console: Console, args: argparse.Namespace, broken: list[str]) -> di
                 if ratio < 1.0
             ]
             progress(done / len(worlds) / len(shapes))
+    hits = {i: stability_hits.limit(i) for i in integrators}
+    table.add_row("hits", stability_hits.NAME, *(f"{ratio:.2f}" for ratio in hits.values()))
+    finite = {i: ratio if math.isfinite(ratio) else None for i, ratio in hits.items()}
+    report["hits"] = {stability_hits.NAME: finite}
+    broken += [f"hits, {i}: unstable below ws.stable_dt" for i in hits if hits[i] < 1.0]
     console.print("smallest unstable step over ws.stable_dt; inf: none up to 2.9 times the bound")
     console.print(table)
     return report
