@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warp_springs.body.connections import Connections
 from warp_springs.body.elements import NONE, Elements
 from warp_springs.body.fields import FIELDS, settled
 from warp_springs.body.placing import Placing
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from warp_springs.body.variants import Variants
     from warp_springs.materials import Material, Region
 
-__all__ = ["Robot"]
+__all__ = ["Robot", "made"]
 
 
 class Robot(Placing, Verbs):
@@ -369,19 +368,6 @@ class Robot(Placing, Verbs):
 _ARRAYS = tuple(name for name, field in FIELDS.items() if field.rule != "table")
 
 
-class _Connections:
-    """The springs of one body, shared by all robots derived from it, with their key."""
-
-    def __init__(self, n_masses: int, springs: IntArray) -> None:
-        self.n_masses, self.springs = n_masses, springs
-
-    @cached_property
-    def key(self) -> bytes:
-        digest = hashlib.blake2b(self.springs.tobytes(), digest_size=16)
-        digest.update(self.n_masses.to_bytes(8, "little"))
-        return digest.digest()
-
-
 def _checked_elements(elements: Elements | None) -> Elements:
     if elements is None:
         return NONE
@@ -391,15 +377,22 @@ def _checked_elements(elements: Elements | None) -> Elements:
 
 
 def _assign(
-    robot: Robot, values: dict[str, Any], elements: Elements, same: _Connections | None = None
+    robot: Robot, values: dict[str, Any], elements: Elements, same: Connections | None = None
 ) -> None:
     for name, value in values.items():
         object.__setattr__(robot, name, value)
-    connections = same or _Connections(len(values["masses"]), values["springs"])
+    connections = same or Connections(len(values["masses"]), values["springs"])
     if elements is not NONE:
         elements.check(len(values["masses"]), len(values["springs"]))
     object.__setattr__(robot, "_connections", connections)
     object.__setattr__(robot, "elements", elements)
+
+
+def made(values: dict[str, Any], elements: Elements) -> Robot:
+    """A robot of fields that are all checked and frozen."""
+    robot = object.__new__(Robot)
+    _assign(robot, values, elements)
+    return robot
 
 
 def _rebuilt(fields: dict[str, Any]) -> Robot:

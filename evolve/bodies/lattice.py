@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,9 @@ if TYPE_CHECKING:
     import warp_springs as ws
 
 __all__ = ["Lattice"]
+
+AT_ONCE = 256
+"""Bodies whose springs are worked out together."""
 
 
 class Lattice:
@@ -27,17 +29,11 @@ class Lattice:
     """
 
     def __init__(self, cells: tuple[int, int, int], edge: float) -> None:
-        import warp_springs as ws
-
         self.cells, self.edge = cells, edge
         self.size = int(np.prod(cells))
-        full = ws.shapes.lattice(*cells, edge=edge)
         self.centres = (np.indices(cells).reshape(3, -1).T + 0.5) * edge
         """Middles of the voxels [m], shape (V, 3)."""
-        grid = np.rint(full.positions / edge).astype(np.int64)
-        self._owners = _owners(grid[full.springs], cells)
         self._sides = _sides(cells)
-        self._bodies = lru_cache(maxsize=4096)(self._body)
 
     def connected(self, masks: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
         """The largest part of each mask whose voxels share sides, shape (n, V), bool.
@@ -85,51 +81,49 @@ class Lattice:
             weight: Mass of a robot of so many points [kg].
             period: Length of an actuation cycle [s].
         """
-        omega = 2.0 * np.pi / period
-        nothing = np.zeros((len(masks), 1))  # what a spring's missing voxels add
-        log = np.concatenate([np.log(stiffness), nothing], axis=1)
-        swing = np.concatenate([swing, nothing], axis=1)
         robots = []
-        for row, mask in enumerate(masks):
-            body, owners = self._bodies(mask.tobytes())
-            count = (owners < self.size).sum(axis=0)
-            mean = swing[row][owners].sum(axis=0) / count
-            amplitude = np.abs(mean)
-            robots.append(
-                body.replace(
-                    masses=np.full(body.n_masses, weight(body.n_masses) / body.n_masses),
-                    stiffness=np.exp(log[row][owners].sum(axis=0) / count),
-                    amplitude=body.rest_length * amplitude,
-                    phase=np.where(amplitude > 0.0, np.angle(mean), 0.0),
-                    omega=omega,
-                )
-            )
+        for first in range(0, len(masks), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            robots += self._cut(masks[some], stiffness[some], swing[some], weight, period)
         return robots
 
-    def _body(self, mask: bytes) -> tuple[ws.Robot, np.ndarray]:
-        """The body of a mask, and the voxels of each of its springs, (4, S), filled up with V."""
+    def _cut(self, masks, stiffness, swing, weight, period) -> list[ws.Robot]:
+        """As `robots`, of so few that their springs fit the cache."""
         import warp_springs as ws
 
-        present = np.frombuffer(mask, bool)
-        body = ws.shapes.voxels(present.reshape(self.cells), self.edge)
-        # Springs keep the order of the full lattice, so those of the body are found by a mask.
-        shared = np.append(present, False)[self._owners]
-        mine = np.where(shared, self._owners, self.size)[:, shared.any(axis=0)]
-        return body, mine
+        bodies = ws.shapes.Cut(masks.reshape(-1, *self.cells), self.edge)
+        # What a spring's missing voxels add is nothing.
+        nothing = ((0, 0), (0, 1))
+        there = np.pad(masks, nothing)
+        tables = [
+            np.pad(np.where(masks, values, 0.0), nothing).ravel()
+            for values in (np.log(stiffness), swing.real, swing.imag)
+        ]
+        places = bodies.body * there.shape[1] + bodies.sharing
+        count = _sum(there.ravel().astype(np.float64), places)
+        log = _sum(tables[0], places) / count
+        mean = np.empty(len(log), np.complex128)
+        mean.real, mean.imag = (
+            _sum(table, places[:2]) + _sum(table, places[2:]) for table in tables[1:]
+        )
+        mean /= count
+        amplitude = np.abs(mean)
+        weights = [weight(points) / points for points in bodies.n_masses.tolist()]
+        return bodies.robots(
+            weights,
+            np.exp(log),
+            2.0 * np.pi / period,
+            amplitude=bodies.lengths * amplitude,
+            phase=np.where(amplitude > 0.0, np.angle(mean), 0.0),
+        )
 
 
-def _owners(ends: np.ndarray, cells: tuple[int, int, int]) -> np.ndarray:
-    """The voxels that contain both ends of springs, (S, 2, 3) in edges: (4, S), filled with V."""
-    low, high = ends.max(axis=1) - 1, ends.min(axis=1)
-    found = np.full((4, len(ends)), int(np.prod(cells)))
-    filled = np.zeros(len(ends), np.int64)
-    for step in np.ndindex(2, 2, 2):
-        cell = low + step
-        inside = ((cell >= 0) & (cell < cells) & (cell <= high)).all(axis=1)
-        rows = np.flatnonzero(inside)
-        found[filled[rows], rows] = np.ravel_multi_index(cell[rows].T, cells)
-        filled[rows] += 1
-    return found
+def _sum(table: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Sums of the values at some places, (4, S) -> (S,), in their order."""
+    total = table[places[0]]
+    for more in places[1:]:
+        total += table[more]
+    return total
 
 
 def _sides(cells: tuple[int, int, int]) -> np.ndarray:

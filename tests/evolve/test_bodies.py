@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import warp_springs as ws
+from evolve.bodies.lattice import Lattice
 from evolve.bodies.operators import BODY, CONTROL, mirror, varied
 from evolve.bodies.plan import connected_parts, tidied
 from evolve.encodings import ENCODINGS
@@ -294,3 +295,29 @@ def test_footfall_is_how_long_the_feet_stand():
     assert found[0] == pytest.approx(1.0)
     landed = np.sqrt(2.0 / 9.81)
     assert 0.0 < found[1] < (1.0 - landed) / 0.8, "its feet stand after it landed, at most"
+
+
+def test_springs_of_a_voxel_body_do_what_their_voxels_do_on_average():
+    """Against the bodies of one mask at a time and sums over each spring's voxels."""
+    lattice, draw = Lattice((3, 3, 2), 0.1), rng(31)
+    masks = draw.random((300, 18)) < 0.6
+    masks = lattice.connected(masks, np.zeros(300, int))
+    stiffness = draw.uniform(1e3, 2e4, masks.shape)
+    swing = draw.uniform(0.0, 0.2, masks.shape) * np.exp(2j * np.pi * draw.random(masks.shape))
+    robots = lattice.robots(masks, stiffness, swing, lambda points: 0.1 * points, 0.5)
+    corner = np.array(np.unravel_index(np.arange(18), (3, 3, 2))).T
+    for i in (0, 7, 255, 256, 299):
+        body = ws.shapes.voxels(masks[i].reshape(3, 3, 2), 0.1)
+        assert robots[i].topology == body.topology
+        np.testing.assert_array_equal(robots[i].positions, body.positions)
+        np.testing.assert_array_equal(robots[i].faces, body.faces)
+        ends = np.rint(body.positions / 0.1)
+        ends[:, 2] += corner[masks[i], 2].min()
+        ends = ends[body.springs][:, :, None]
+        owns = ((ends >= corner) & (ends <= corner + 1)).all(axis=(1, 3)) & masks[i]
+        mean = (owns * swing[i]).sum(axis=1) / owns.sum(axis=1)
+        log = (owns * np.log(stiffness[i])).sum(axis=1) / owns.sum(axis=1)
+        np.testing.assert_allclose(robots[i].stiffness, np.exp(log), rtol=1e-13)
+        np.testing.assert_allclose(robots[i].amplitude, body.lengths * np.abs(mean), rtol=1e-12)
+        np.testing.assert_allclose(robots[i].phase, np.angle(mean), rtol=1e-9)
+        np.testing.assert_allclose(robots[i].masses, 0.1)

@@ -90,3 +90,21 @@ def test_a_lone_robot_has_the_bits_of_a_bundle_whatever_its_size(precision, cell
     many = ws.Simulation([body] * 3, SCENE, **options).run(0.1)
     assert (alone.positions(0) == many.positions(2)).all()
     assert (alone.velocities(0) == many.velocities(2)).all()
+
+
+def test_a_few_of_each_kind_share_bundles_with_others():
+    """Copies of many bodies, moved apart: each keeps the bits that it has alone."""
+    kinds = cut_from_a_lattice(24)
+    robots = [body.moved((0.0, 0.0, 0.001 * i)) for body in kinds for i in range(3)]
+    sim = ws.Simulation(robots, SCENE, dt=1e-3)
+    shared = sum(g.count for g in sim._batch.groups if g.features.width > 1)
+    assert merged(sim) == shared >= 72 // 8, "nobody has a bundle for three"
+    together = sim.run(0.1)
+    for i in (0, 1, 40, 71):
+        alone = ws.Simulation(robots[i], SCENE, dt=1e-3).run(0.1)
+        assert (together.positions(i) == alone.positions(0)).all()
+    # Off a lattice three of a kind share a bundle of their own.
+    bent = [r.replace(positions=r.positions + 0.003 * np.sin(9.0 * r.positions)) for r in robots]
+    sim = ws.Simulation(bent, SCENE, dt=1e-3)
+    assert merged(sim) == 0
+    assert sum(g.count for g in sim._batch.groups if g.features.width > 1) == 24

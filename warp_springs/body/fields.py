@@ -23,7 +23,9 @@ __all__ = [
     "FIELDS",
     "Field",
     "check_labels",
+    "check_masses_named",
     "checked",
+    "filled",
     "freeze",
     "is_frozen",
     "require_positive",
@@ -104,7 +106,7 @@ def settled(given: Mapping[str, Any], to_check: Container[str]) -> dict[str, Any
             raise ValueError("positions: shape (0, 3) given, at least one mass expected")
     if "springs" in to_check:
         done["springs"] = checked("springs", given["springs"], (None, 2))
-        _check_indices("springs", done["springs"], len(done["positions"]))
+        check_masses_named("springs", done["springs"], len(done["positions"]))
     counts = {"mass": len(done["positions"]), "spring": len(done["springs"]), "face": None}
     for name, field in FIELDS.items():
         if name in done:
@@ -119,11 +121,11 @@ def settled(given: Mapping[str, Any], to_check: Container[str]) -> dict[str, Any
         elif name == "materials":
             done[name] = _checked_table(value)
         elif value is None and name in _FILLS:
-            done[name] = _filled((counts[field.per] or 0, *field.row), _FILLS[name], field.dtype)
+            done[name] = filled(name, (counts[field.per] or 0, *field.row))
         else:
             done[name] = checked(name, value, (counts[field.per], *field.row))
     if "faces" in to_check:
-        _check_indices("faces", done["faces"], counts["mass"])
+        check_masses_named("faces", done["faces"], counts["mass"])
     if "material" in to_check or "materials" in to_check:
         check_labels(done["material"], len(done["materials"]))
     return done
@@ -224,22 +226,25 @@ def _checked_number(name: str, value: float) -> float:
     raise ValueError(f"{name} = {value}: {_ALLOWED[rule]} ({FIELDS[name].unit})")
 
 
-def _check_indices(name: str, array: IntArray, n_masses: int) -> None:
+def check_masses_named(name: str, array: IntArray, n_masses: int | IntArray) -> None:
+    """Refuse rows that do not name different masses, of so many, or of so many in each row."""
     if array.size == 0:
         return
+    each = np.broadcast_to(n_masses, len(array))
     low, high = np.minimum.reduce(array, axis=None), np.maximum.reduce(array, axis=None)
     columns = array.T
     repeated = columns[0] == columns[1]
     for a, b in ((1, 2), (2, 0)) if len(columns) == 3 else ():
         repeated = repeated | (columns[a] == columns[b])
-    if low >= 0 and high < n_masses and not np.logical_or.reduce(repeated):
+    below = high < n_masses if np.ndim(n_masses) == 0 else (array < each[:, None]).all()
+    if low >= 0 and below and not np.logical_or.reduce(repeated):
         return
-    outside = ((array < 0) | (array >= n_masses)).any(axis=1)
+    outside = ((array < 0) | (array >= each[:, None])).any(axis=1)
     row = int(np.argmax(outside | repeated))
     what = "two" if name == "springs" else "three"
     raise ValueError(
         f"{name}[{row}] = {tuple(array[row].tolist())}: must name {what} different masses, "
-        f"each from 0 to {n_masses - 1}"
+        f"each from 0 to {each[row] - 1}"
     )
 
 
@@ -262,6 +267,11 @@ def check_labels(labels: IntArray, n_materials: int) -> None:
         f"material{list(at)} = {labels[at]}: must be -1 (none) or a row of the {n_materials} "
         "materials"
     )
+
+
+def filled(name: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    """What a field holds that was left out, such as no velocities."""
+    return _filled(shape, _FILLS[name], FIELDS[name].dtype)
 
 
 def _filled(shape: tuple[int, ...], value: float, dtype: np.dtype) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import operator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -101,8 +102,7 @@ def voxels(
     mass = require_positive("mass_per_vertex", mass_per_vertex)
     stiffness = require_positive("stiffness", stiffness)
     solid = _checked_mask(mask)
-    build = _template if solid.size <= _KEPT_VOXELS else _template.__wrapped__
-    table = build(solid.shape)
+    table = voxel_table(solid.shape)
 
     present = np.append(solid.reshape(-1), False)  # the last one stands for "outside"
     vertices = np.flatnonzero(_any_of(present, table.vertex_voxels))
@@ -157,11 +157,17 @@ class _Template:
     edges: NDArray[np.int32]
     """The vertices that a spring may join, lower first, in ascending order, shape (E, 2)."""
     edge_voxels: NDArray[np.intp]
-    """The voxels that contain both ends of each spring, shape (4, E)."""
+    """The voxels that contain both ends of each spring, in ascending order, shape (4, E)."""
     quads: NDArray[np.int32]
     """The two triangles of each side of each voxel, outward, shape (Q, 6)."""
     quad_voxels: NDArray[np.intp]
     """The voxel on the inner and on the outer side of each square, shape (2, Q)."""
+
+
+def voxel_table(shape: tuple[int, int, int]) -> _Template:
+    """The table of a bounding lattice; those of moderate size are kept."""
+    build = _template if math.prod(shape) <= _KEPT_VOXELS else _template.__wrapped__
+    return build(shape)
 
 
 @lru_cache(maxsize=64)
@@ -188,7 +194,7 @@ def _template(shape: tuple[int, int, int]) -> _Template:
         grid=np.indices(points).reshape(3, -1).T.astype(np.float64),
         vertex_voxels=vertex_voxels,
         edges=np.stack(np.divmod(codes, n_vertices), axis=1).astype(np.int32),
-        edge_voxels=edge_voxels,
+        edge_voxels=np.sort(edge_voxels, axis=0),
         quads=np.concatenate(quads).astype(np.int32),
         quad_voxels=np.stack([inside, np.concatenate(outside)]),
     )
