@@ -1,8 +1,8 @@
 """Ragged generations: what it costs that every robot has a body of its own.
 
-    python -m benchmarks.bodies packing      # built and stepped, all different against all alike
-    python -m benchmarks.bodies building     # from genomes to a packed batch, against stepping it
-    python -m benchmarks.bodies genomes      # random genomes of every encoding, stepped 100 times
+    python benchmarks/bodies.py packing      # built and stepped, all different against all alike
+    python benchmarks/bodies.py building     # from genomes to a packed batch, against stepping it
+    python benchmarks/bodies.py genomes      # random genomes of every encoding, stepped 100 times
 
 Prints one JSON object a line.
 """

@@ -1,8 +1,8 @@
 """Does it pay to evolve bodies? Searches for bodies against controllers of a fixed body.
 
-    python -m benchmarks.body_search                     # every search, five seeds; resumes
-    python -m benchmarks.body_search --only critter walker --seeds 2
-    python -m benchmarks.body_search --draw curves.png --gains
+    python benchmarks/body_search.py                     # every search, five seeds; resumes
+    python benchmarks/body_search.py --only critter walker --seeds 2
+    python benchmarks/body_search.py --draw curves.png --gains
 
 Equal evaluations, physics, cycles and amplitudes; the fitness is `steady`, body diameters per cycle
 in the slower half of the measurement. Each search is a folder of runs, so that one that was stopped

@@ -1,4 +1,4 @@
-"""How far the packaged presets come in two minutes: python -m benchmarks.presets
+"""How far the packaged presets come in two minutes: python benchmarks/presets.py
 
 For each preset the best fitness of its first generation, that of its champion after so many seconds
 or all its generations, and how long that took, kernels loaded before. The champion is the fittest
@@ -12,8 +12,9 @@ from __future__ import annotations
 import argparse
 import time
 
+from search import finish
+
 import warp_springs as ws
-from benchmarks.search import finish
 from evolve import Evaluator, Search, load, preset_names
 from evolve.fitness import UNITS
 from evolve.judging.worlds import looked_at_again

@@ -99,6 +99,13 @@ def test_every_program_and_picture_that_a_text_names_is_there():
             assert (ROOT / path).is_file(), (text, name)
 
 
+def test_every_benchmark_starts_as_a_script():
+    for path in ROOT.glob("benchmarks/**/*.py"):
+        assert not [m for m in imports(path) if m.split(".")[0] == "benchmarks"], path
+    for text in [*ROOT.glob("*/guide/*.md"), *ROOT.glob("benchmarks/*.py")]:
+        assert "python -m benchmarks" not in text.read_text(encoding="utf-8"), text
+
+
 @pytest.mark.parametrize("kind", ["ENCODINGS", "OPTIMIZERS", "FITNESS"])
 def test_the_guide_to_evolution_names_all_there_is(kind):
     from evolve import encodings, fitness, optimizers

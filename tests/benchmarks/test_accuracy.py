@@ -4,23 +4,16 @@ import dataclasses
 import json
 import math
 import sys
-from pathlib import Path
 
+import accuracy
 import numpy as np
 import pytest
+from accuracy_measure import FEWEST, QUICK_STEPS, STEPS, Row, Series, cost_of, recommended
+from accuracy_scenes import CASES
+from accuracy_truth import solve
 
 import warp_springs as ws
 from warp_springs.reference import continuum, energies
-
-pytest.importorskip("scipy")
-BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
-if BENCHMARKS not in sys.path:
-    sys.path.insert(0, BENCHMARKS)
-
-import accuracy  # noqa: E402
-from accuracy_measure import FEWEST, QUICK_STEPS, STEPS, Row, Series, cost_of, recommended  # noqa: E402
-from accuracy_scenes import CASES  # noqa: E402
-from accuracy_truth import solve  # noqa: E402
 
 CLOSED_FORMS = ("oscillator", "slinky", "drag", "slide")
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks import body_search
+import body_search
+
 from evolve.run import open_all
 from evolve.toml import load
 

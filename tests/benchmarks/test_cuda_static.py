@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
+import cuda_static
 import pytest
 import warp as wp
 
-from benchmarks import cuda_static
 from warp_springs.engine.layouts import BLOCK_SIZES
 from warp_springs.kernels.control import control
 from warp_springs.kernels.traits import Traits

@@ -8,20 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from peers import environments, fleet, measure, report
+from peers.figure import draw
+from peers.lanes import Lanes
+from peers.populations import population
+from peers.problem import Problem
+from peers.programs import in_cpp, in_numpy, in_warp, in_warp_springs
 
 from warp_springs.bench.populations import DT, scene_of, variants
 from warp_springs.reference import Trial
-
-BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
-if BENCHMARKS not in sys.path:
-    sys.path.insert(0, BENCHMARKS)
-
-from peers import environments, fleet, measure, report  # noqa: E402
-from peers.figure import draw  # noqa: E402
-from peers.lanes import Lanes  # noqa: E402
-from peers.populations import population  # noqa: E402
-from peers.problem import Problem  # noqa: E402
-from peers.programs import in_cpp, in_numpy, in_warp, in_warp_springs  # noqa: E402
 
 ROBOTS, STEPS = 19, 150  # not a whole number of vectors; they land after 100 steps
 

@@ -1,6 +1,7 @@
 """The table of the presets: what it shows is what a search finds."""
 
-from benchmarks import presets
+import presets
+
 from evolve import Evaluator, Search, load
 
 
