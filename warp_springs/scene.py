@@ -123,7 +123,8 @@ class Collisions:
         stiffness: Of the temporary springs [N/m].
         static_friction: Coefficient mu_s below which two surfaces do not slide.
         kinetic_friction: Coefficient mu_k with which they slide.
-        damping: Of the temporary springs, as a part of critical damping.
+        damping: Of the temporary springs, as a part of critical damping; of all that push at once
+            where corners meet, together.
         within: Whether a body also collides with itself.
     """
 
