@@ -19,6 +19,7 @@ import numpy as np
 
 import warp_springs as ws
 from evolve.encodings import ENCODINGS
+from evolve.memory import keep_memory
 
 SCENE = ws.Scene(ground=ws.Ground(), damping=4.0)
 DT = 1e-3
@@ -97,6 +98,7 @@ def building(options: argparse.Namespace) -> None:
             break
     genomes = encoding.take(encoding.concatenate(parts), np.arange(options.robots))
     found = []
+    keep_memory()  # as every search does
     for _ in range(options.repeats):
         started = time.perf_counter()
         robots = encoding.express(genomes)

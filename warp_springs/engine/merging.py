@@ -59,14 +59,19 @@ class Union:
             springs: Whether they are of springs.
             nothing: What lanes hold that have none, shape (columns,).
         """
-        values = values.reshape(len(values), -1)
+        values = values if values.ndim == 2 else values.reshape(len(values), -1)
         sizes, row = (self.springs, self.spring_row) if springs else (self.masses, self.mass_row)
-        table = np.empty((sizes.sum(), values.shape[1], self.width), values.dtype)
-        table[:] = nothing[:, None]
-        robot = np.repeat(np.arange(len(counts)), counts)
-        first = np.cumsum(sizes) - sizes
-        table[first[robot // self.width] + row, :, robot % self.width] = values
-        return table.ravel()
+        columns, width = values.shape[1], self.width
+        table = np.zeros((sizes.sum(), columns, width), values.dtype)
+        if nothing.any():
+            table[:] = nothing[:, None]
+        robot, first = np.arange(len(counts)), np.cumsum(sizes) - sizes
+        start = first[robot // width] * (columns * width) + robot % width
+        place, flat = np.repeat(start, counts) + row * (columns * width), table.ravel()
+        for column in range(columns):  # each is in one piece
+            flat[place] = values[:, column]
+            place += width
+        return flat
 
 
 def unions(strip: Strip, width: int) -> Iterator[tuple[np.ndarray, Union | None]]:
