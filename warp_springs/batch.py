@@ -15,6 +15,7 @@ import numpy as np
 
 from warp_springs.body.elements import NONE
 from warp_springs.body.variants import Variants
+from warp_springs.engine.buffers import aligned, aligned_empty, is_buffer, lane_major
 from warp_springs.engine.colliding import PACKED_COLLISIONS, collision_buffers, collision_counts
 from warp_springs.engine.curve import ranges
 from warp_springs.engine.element_packing import (
@@ -30,10 +31,7 @@ from warp_springs.engine.grouping import Grouping
 from warp_springs.engine.method import Method
 from warp_springs.engine.packing import (
     Strip,
-    aligned,
-    aligned_empty,
     coefficients,
-    lane_major,
     largest,
     local_frames,
     longest_springs,
@@ -383,7 +381,8 @@ class Batch:
 
     def _joined(self, name: str, parts: list[np.ndarray]) -> np.ndarray:
         """The parts of a buffer in one array, aligned as vector loads need."""
-        # By far the largest was made to be the buffer itself, if there is one strip.
-        if name == "coefficients" and len(parts) == 1 and parts[0].ctypes.data % 64 == 0:
+        dtype = dtype_of(name, self._method.precision)
+        # What was made for its lanes may be the buffer itself, if there is one strip.
+        if len(parts) == 1 and is_buffer(parts[0], dtype):
             return parts[0]
-        return aligned(parts, dtype_of(name, self._method.precision))
+        return aligned(parts, dtype)

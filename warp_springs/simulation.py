@@ -15,10 +15,10 @@ from warp_springs.body.variants import Variants
 from warp_springs.checks import check_choice, check_number
 from warp_springs.energy import Energy
 from warp_springs.engine.audit import Audit, flow_places
+from warp_springs.engine.buffers import aligned
 from warp_springs.engine.control import pilots
 from warp_springs.engine.layouts import LAYOUTS, check_layout, choose, device_named
 from warp_springs.engine.method import AUTO_DT, Method
-from warp_springs.engine.packing import aligned
 from warp_springs.engine.slices import Tape, cut, run_all
 from warp_springs.engine.worlds import Member, gathered, on_a_grid
 from warp_springs.kernels.buffers import ACCOUNTS, ENERGIES, dtype_of

@@ -17,9 +17,9 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Group
+from warp_springs.engine.buffers import aligned
 from warp_springs.engine.crowd_slice import Crowd
 from warp_springs.engine.layouts import block_size
-from warp_springs.engine.packing import aligned
 from warp_springs.kernels.block import BLOCK, block
 from warp_springs.kernels.buffers import BUNDLE
 from warp_springs.kernels.features import CHECK_EVERY

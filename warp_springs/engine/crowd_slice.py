@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 
 from warp_springs.batch import Batch, Slots
+from warp_springs.engine.buffers import aligned
 from warp_springs.engine.control import Reach
 from warp_springs.engine.gathering import (
     WEAR,
@@ -22,7 +23,6 @@ from warp_springs.engine.gathering import (
     ranges,
     worn_springs,
 )
-from warp_springs.engine.packing import aligned
 from warp_springs.kernels.buffers import BUNDLE, SEEN, real_dtype, structs
 from warp_springs.kernels.crowd_collisions import FEATURE
 from warp_springs.kernels.gather import (

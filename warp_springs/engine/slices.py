@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import functools
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, wait
@@ -14,10 +13,10 @@ import warp as wp
 
 from warp_springs.batch import Batch, Group, Slots
 from warp_springs.engine.audit import AUDIT_EVERY, Audit, flow_places
+from warp_springs.engine.buffers import aligned
 from warp_springs.engine.control import Pilot, Reach
 from warp_springs.engine.crew import crew
 from warp_springs.engine.crowd import Crowd, crowds
-from warp_springs.engine.packing import aligned
 from warp_springs.engine.ranks import Ranks
 from warp_springs.engine.reel import Reel
 from warp_springs.kernels.buffers import ACCOUNTS, BUNDLE, ENERGIES, real_dtype, structs
@@ -353,16 +352,10 @@ def _filled(struct, buffers: Mapping[str, np.ndarray]):
     """A struct of the kernels over the flat buffers."""
     instance = struct()
     for name in struct.vars:
-        # Most buffers of most batches are empty: nothing to look at, and dear to make.
-        values = buffers[name]
-        setattr(instance, name, _on_device(values) if values.size else _empty(values.dtype))
+        # Most buffers of most batches are empty, as a struct is before anything is set.
+        if buffers[name].size:
+            setattr(instance, name, _on_device(buffers[name]))
     return instance
-
-
-@functools.cache
-def _empty(dtype: np.dtype) -> wp.array:
-    """An array without elements."""
-    return _on_device(np.empty(0, dtype))
 
 
 def _on_device(values: np.ndarray) -> wp.array:
