@@ -82,7 +82,9 @@ class DirectEncoding(FixedBody, ArrayGenomes):
         genes *= np.repeat(step, kinds_of)[line]
         mutants = genomes.copy()
         genes += mutants.ravel()[places]
-        mutants.ravel()[places] = folded(genes, np.tile(self.on_circle, n)[line])
+        beyond = np.flatnonzero((genes < 0.0) | (genes > 1.0))
+        genes[beyond] = folded(genes[beyond], self.on_circle[line[beyond] % kinds_of])
+        mutants.ravel()[places] = genes
         return mutants
 
     def cross(self, a: np.ndarray, b: np.ndarray, rng: np.random.Generator) -> np.ndarray:
