@@ -12,6 +12,10 @@ lists those within thickness and margin of it; a list that does not fit is repla
 through the tree. A feature that does not touch adds nothing, and the order of those that do is that
 of the tree: when a list was made does not matter.
 
+What friction remembers each side keeps for itself. Of a feature that touches more than CROWD_GRIPS
+others at once, a coarse triangle under a fine mesh, the rest is rubbed without memory on that side
+alone: there friction is not quite the same from both sides.
+
 What a layout must add: ``base_of(robot)``, where its positions begin in a buffer of quads.
 """
 
