@@ -336,3 +336,20 @@ def test_garbage_ends_in_a_status_or_finite_and_disturbs_nobody(layout, garbage)
         assert np.isfinite(result.positions(i)).all()
         assert np.isfinite(result.velocities(i)).all()
     assert [bits(result, len(garbage) + i) for i in range(len(robots))] == expected
+
+
+def test_bound_with_collisions_counts_all_pairs_around_two_corners():
+    # The busiest corners of a cube have six triangles and six edges: 6 + 6 + 6 x 6 pairs.
+    cube, smooth = ws.shapes.cube(), {"static_friction": 0.0, "kinetic_friction": 0.0, "damping": 0}
+    assert np.bincount(cube.faces.ravel()).max() == 6
+    hard = ws.Collisions(stiffness=1e9, **smooth)  # next to which the cube's springs are nothing
+    for integrator in INTEGRATORS:
+        bound = ws.stable_dt(cube, ws.Scene(ground=None, collisions=hard), integrator)
+        exact = 0.75 * LIMITS[integrator] / np.sqrt(2 * 48 * 1e9 / 0.1)
+        assert bound == pytest.approx(exact, rel=3e-3)
+        damped = ws.Collisions(stiffness=1e9, damping=1.0)
+        slower = ws.stable_dt(cube, ws.Scene(ground=None, collisions=damped), integrator)
+        assert slower < 0.7 * bound
+    many = [cube, cube.replace(masses=0.001)]
+    scene = ws.Scene(collisions=ws.Collisions())
+    assert ws.stable_dt(many, scene).tolist() == [ws.stable_dt(one, scene) for one in many]
