@@ -76,8 +76,9 @@ def _run(command: Command) -> int:
         sys.stdout = None
         return 1
     except FAILURES as error:
-        words = " ".join(str(error).split()) or type(error).__name__
-        print(f"evolve: {words}", file=sys.stderr)
+        from warp_springs import one_line
+
+        print(f"evolve: {one_line(error)}", file=sys.stderr)
         return 1
 
 

@@ -61,7 +61,9 @@ class SimulationConfig(configs.SimulationConfig):
     @model_validator(mode="after")
     def _a_cluster_has_workers(self) -> SimulationConfig:
         if self.cluster and not self.devices:
-            raise ValueError("cluster: simulation.devices must say how many workers, and on what")
+            raise ValueError(
+                "cluster: devices must say how many workers, and on what, as in --devices cpu cpu"
+            )
         return self
 
     @model_validator(mode="after")

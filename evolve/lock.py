@@ -21,8 +21,10 @@ class Lock:
         self._connection = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
             self._connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
+        except sqlite3.OperationalError as error:
             self._connection.close()
+            if "locked" not in str(error):
+                raise StoreError(f"{path.parent} cannot be written to: {error}") from None
             raise StoreError(f"{path.parent} is being {doing} by another process") from None
 
     def release(self) -> None:

@@ -77,6 +77,8 @@ class Store:
         # The last connection that may write tidies SQLite's log away, so even readers may.
         mode = "rw" if write or os.access(path, os.W_OK) else "ro"
         uri = f"{path.resolve().as_uri()}?mode={mode}"
+        if not (write or os.access(path.parent, os.W_OK) or _log(path).exists()):
+            uri += "&immutable=1"  # where nobody writes, SQLite cannot make the files of its log
         connection = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=30.0)
         try:
             schema.check(connection, path, thoroughly=write)
@@ -338,13 +340,21 @@ class Store:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         """All of what happens within, or nothing."""
-        self._connection.execute("BEGIN IMMEDIATE")
         try:
+            self._connection.execute("BEGIN IMMEDIATE")
             yield
-        except BaseException:
-            self._connection.execute("ROLLBACK")
+            self._connection.execute("COMMIT")
+        except BaseException as error:
+            if self._connection.in_transaction:  # SQLite leaves it by itself when the disk is full
+                self._connection.execute("ROLLBACK")
+            if isinstance(error, sqlite3.OperationalError):
+                raise StoreError(f"{self.path} cannot be written: {error}") from error
             raise
-        self._connection.execute("COMMIT")
+
+
+def _log(path: Path) -> Path:
+    """Where SQLite keeps what it has not yet folded into a record."""
+    return path.with_name(path.name + "-wal")
 
 
 def _scores(rows: Sequence[tuple], names: Sequence[str]) -> Scores:

@@ -16,13 +16,14 @@ from warp_springs.body.elements import Elements, Push, Tether, Timetable
 from warp_springs.body.variants import Variants
 from warp_springs.body.waveform import Waveform
 from warp_springs.energy import Energy
+from warp_springs.engine.layouts import device_named
 from warp_springs.materials import Material
 from warp_springs.result import Result
 from warp_springs.robot import Robot
 from warp_springs.scene import Collisions, Ground, Scene, Water, damping_rate
 from warp_springs.simulation import Simulation
 from warp_springs.stability import Limits, Status, stable_dt
-from warp_springs.startup import quiet
+from warp_springs.startup import one_line, quiet
 from warp_springs.surfaces import (
     Box,
     Circle,
@@ -67,12 +68,14 @@ __all__ = [
     "Waveform",
     "config",
     "damping_rate",
+    "device_named",
     "export_html",
     "export_usd",
     "height_map",
     "hills",
     "html_page",
     "materials",
+    "one_line",
     "plots",
     "quiet",
     "read_mesh",

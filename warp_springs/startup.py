@@ -1,4 +1,4 @@
-"""Starting Warp without its banner, for programs that own their screen."""
+"""For programs that own their screen: Warp without its banner, errors as one line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from pathlib import Path
 
 import warp as wp
 
-__all__ = ["quiet"]
+__all__ = ["one_line", "quiet"]
+
+
+def one_line(error: BaseException) -> str:
+    """What went wrong, in one line for a person; of the system's errors, which file it is about."""
+    words = str(error)
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        words = f"{os.fsdecode(error.filename)}: {error.strerror}"
+    return " ".join(words.split()) or type(error).__name__
 
 
 def quiet() -> None:

@@ -52,8 +52,8 @@ class Lineage:
         way = line(everybody)
         shown = way if self.whole else steps(way)
         console.print(
-            f"#{way[-1].id}: {len(everybody) - 1:,} ancestors, {len(way) - 1} steps from the "
-            f"first, {len(shown)} individuals shown; "
+            f"#{way[-1].id}: ancestors {len(everybody) - 1:,}, steps from the first "
+            f"{len(way) - 1}, individuals shown {len(shown)}; "
             f"{in_units('fitness', UNITS[run.config.task.fitness])}",
             highlight=False,
             soft_wrap=True,

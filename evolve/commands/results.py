@@ -47,6 +47,8 @@ class Report:
         from evolve.reports.page import REPORT
         from evolve.run import open_all
 
+        if self.notes is not None and not self.notes.is_file():
+            raise RunError(f"--notes: there is no file {self.notes}")
         if not self.directories:
             raise RunError("which run? give its folder, for example: evolve report runs/walker")
         runs = [run for directory in self.directories for run in open_all(directory)]

@@ -14,6 +14,8 @@ from evolve.errors import RunError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from evolve.config import RunConfig
+
 __all__ = ["Resume", "Run"]
 
 
@@ -61,13 +63,11 @@ class Run:
 
     def __call__(self, console: Console) -> int:
         """Make the folder, and evolve."""
-        import warp_springs as ws
         from evolve.run import Run as RunFolder
         from evolve.run import create_seeds
         from evolve.toml import load, parse_settings
 
-        if self.extras.live:
-            ws.LiveServer.place(self.extras.live_at)  # refused before a folder is made
+        self.extras.check()  # refused before a folder is made
         flags = {
             "seed": self.seed,
             "generations": self.generations,
@@ -85,10 +85,22 @@ class Run:
         folder = self.out if self.out is not None else Path("runs") / config.name
         if self.seeds < 1:
             raise RunError(f"--seeds must be 1 or more, not {self.seeds}")
+        _check_parts(config)
         if self.seeds == 1:
             return evolve_to_the_end([RunFolder.create(config, folder)], console, self.extras)
         runs = create_seeds(config, self.seeds, folder)
         return evolve_to_the_end(runs, console, self.extras)
+
+
+def _check_parts(config: RunConfig) -> None:
+    """Refuse parts that do not fit each other, or this machine, before a folder is made."""
+    import warp_springs as ws
+
+    ws.quiet()
+    config.make_optimizer(config.make_encoding())
+    if not config.simulation.cluster:  # whose devices are elsewhere
+        for device in {config.simulation.device, *config.simulation.devices}:
+            ws.device_named(device)
 
 
 @dataclass(frozen=True)
@@ -111,6 +123,7 @@ class Resume:
         """Open the folder, and go on."""
         from evolve.run import open_all
 
+        self.extras.check()
         runs = open_all(self.directory)
         for run in runs:
             run.change(generations=self.generations, threads=self.threads)

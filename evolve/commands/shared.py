@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["INTERRUPTED", "Extras", "Flag", "Folder", "Whole", "evolve_to_the_end", "print_written"]
 
+ANYWHERE = "127.0.0.1:0"
+"""On this machine, at a port that is free."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
 
@@ -33,7 +35,7 @@ class Extras:
     live: Flag = False
     """Serve a page with the best robot and the curve while the run lasts, to this machine only; its
     address is printed."""
-    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = "127.0.0.1:0"
+    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = ANYWHERE
     """Where to serve it; port 0 takes one that is free."""
     report: Flag = False
     """Also write report.html at the end, which takes some seconds of filming."""
@@ -44,6 +46,14 @@ class Extras:
     tensorboard: Flag = False
     """Also write the curve for TensorBoard, into the folder of the run, as it grows; needs the
     extra "tensorboard"."""
+
+    def check(self) -> None:
+        """Refuse a place to serve that is none, or that nothing is served at."""
+        import warp_springs as ws
+
+        ws.LiveServer.place(self.live_at)
+        if self.live_at != ANYWHERE and not self.live:
+            raise ValueError(f"--live-at {self.live_at} goes with --live")
 
 
 def evolve_to_the_end(

@@ -203,7 +203,12 @@ MISTAKES = [
         "unknown key task.mesure (did you mean",
     ),
     (["run", "cube", "--set", "x"], "--set takes KEY=VALUE"),
-    (["run", "cube", "--set", "simulation.device=tpu"], "device"),
+    (["run", "cube", "--set", "simulation.device=tpu"], "device: got 'tpu', expected one of"),
+    (["run", "cube", "--devices", "cpu:7"], "device: got 'cpu:7', expected one of"),
+    (["run", "cube", "--optimizer", "coevolution"], "coevolution: needs two populations"),
+    (["run", "cube", "--live-at", "127.0.0.1:80"], "--live-at 127.0.0.1:80 goes with --live"),
+    (["run", "cube", "--cluster", "auto"], "as in --devices cpu cpu"),
+    (["report", ".", "--notes", "none.txt"], "--notes: there is no file none.txt"),
     (["resume", "nowhere"], "there is no folder nowhere"),
     (["report", "nowhere"], "there is no folder nowhere"),
     (["export", "nowhere"], "there is no folder nowhere"),
@@ -220,6 +225,7 @@ def test_a_mistake_costs_one_clear_line(shell, arguments, message):
     assert done.returncode == 1
     assert done.stderr.startswith("evolve: ") and message in done.stderr
     assert done.stderr.count("\n") == 1
+    assert shell("resume", "runs/cube").stderr == "evolve: there is no folder runs/cube\n"
 
 
 def test_a_command_line_without_sense_is_explained(shell):
@@ -237,6 +243,20 @@ def test_a_broken_record_is_one_clear_line(shell, run_folder):
         assert done.stderr == (
             "evolve: runs/cube/run.sqlite cannot be read: file is not a database\n"
         )
+
+
+def test_a_record_where_nobody_may_write_is_still_read(run_folder, monkeypatch):
+    # As on a medium that is read-only: SQLite cannot make the files of its log there.
+    run = Run.open(run_folder)
+    with run.read() as store:
+        digest = store.digest()
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    opened = []
+    connect = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda *a, **k: opened.append(a) or connect(*a, **k))
+    with run.read() as store:
+        assert store.digest() == digest
+    assert opened[-1][0].endswith("?mode=ro&immutable=1")
 
 
 def test_a_run_of_an_older_version_is_one_clear_line(shell, run_folder):

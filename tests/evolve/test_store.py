@@ -214,7 +214,7 @@ def test_a_start_that_was_cut_short_is_started_again(tmp_path):
 
 
 def test_readers_do_not_write(store):
-    with Store.open(store.path) as reader, pytest.raises(sqlite3.OperationalError):
+    with Store.open(store.path) as reader, pytest.raises(StoreError, match="cannot be written"):
         add(reader, 2)
 
 
@@ -237,3 +237,12 @@ def test_the_log_is_folded_into_the_file_while_it_is_open(tmp_path, monkeypatch)
         with Store.open(tmp_path / "alone.sqlite") as alone:
             assert alone.generations == 3
             assert alone.digest() == store.digest()
+
+
+def test_a_full_disk_is_said_with_the_name_of_the_record(store):
+    pages = store._connection.execute("PRAGMA page_count").fetchone()[0]
+    store._connection.execute(f"PRAGMA max_page_count = {pages}")
+    with pytest.raises(StoreError, match=r"run\.sqlite cannot be written: .*full"):
+        for number in range(store.generations, 9):
+            add(store, number, [bytes(20_000)] * 3)
+    assert store.generations == number  # what fitted is kept

@@ -129,5 +129,18 @@ def test_demonstrations_are_listed_and_printed(tmp_path):
     assert [line.split()[0] for line in listed.stdout.splitlines()] == list(demos.NAMES)
     printed = shell(tmp_path, "ten-cubes", "--toml")
     assert printed.stdout == demos.text("ten-cubes")
-    assert shell(tmp_path, "eleven-cubes").returncode == 2
+    refused = shell(tmp_path, "ten-cube")
+    assert refused.returncode == 1 and refused.stderr.count("\n") == 1
+    assert (
+        "no demonstration 'ten-cube' (did you mean 'ten-cubes'?); there are bounc" in refused.stderr
+    )
     assert shell(tmp_path).returncode == 2
+
+
+def test_the_shell_says_a_line_of_each_command_and_all_in_its_own_help(tmp_path):
+    command = [sys.executable, "-m", "warp_springs.cli"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
+    assert done.stdout.count("•") == 7 and "Simulate one of the classroom's" in done.stdout
+    assert len(done.stdout.splitlines()) < 35
+    own = subprocess.run([*command, "demo", "--help"], capture_output=True, text=True, check=True)
+    assert "NAME_energies.png" in own.stdout

@@ -388,7 +388,7 @@ def test_mp4_without_ffmpeg_is_refused_at_once(walk, tmp_path, monkeypatch):
         ({"layout": "row"}, "layout: got 'row', expected 'grid' or 'panel' or 'world'"),
         ({"skin": "blue"}, "skin: got 'blue', expected '#rrggbb'"),
         ({"thickness": 0}, "thickness: got 0"),
-        ({"labels": ["a"]}, "labels must be 2 texts"),
+        ({"labels": ["a"]}, r"labels: got .*each robot shown \(2\)"),
         ({"size": (10, 10), "layout": "panel"}, "too small for a panel of 2"),
         ({"robots": [0, 5]}, "robot 5 does not exist"),
     ],

@@ -70,7 +70,9 @@ def test_a_scene_writes_only_what_it_is_asked_for(shell, tmp_path):
         (["none.toml"], 1, "warp-springs: there is no file none.toml\n"),
         (["scene.toml", "--set", "robot.body.edge=-1"], 1, "scene.toml: robot.body.edge: input"),
         (["scene.toml", "--set", "edge"], 1, "--set takes KEY=VALUE"),
-        (["scene.toml", "--out", "scene.toml"], 1, "scene.toml"),
+        (["scene.toml", "--out", "scene.toml"], 1, "out: scene.toml is no folder"),
+        (["scene.toml", "--live-at", "127.0.0.1:80"], 1, "127.0.0.1:80 goes with --live"),
+        (["."], 1, "cannot read ."),
         ([], 2, "SCENE.toml"),
     ],
 )

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils
+from pxr import Gf, Tf, Usd, UsdGeom, UsdLux, UsdSkel, UsdUtils
 
 import warp_springs as ws
 from tests.warp_springs.usd_reading import (
@@ -404,11 +404,17 @@ def test_writing_over_a_stage_that_is_open_shows_the_new_one(result, tmp_path):
 
 def test_a_failure_of_usd_is_an_os_error(result, tmp_path, monkeypatch):
     def fail(*arguments):
-        Usd.Stage.Open(str(tmp_path / "absent.usdc"))
+        errors = []
+        for _ in range(2):  # a full disk is told of for every block that did not fit
+            with pytest.raises(Tf.ErrorException) as caught:
+                Usd.Stage.Open(str(tmp_path / "absent.usdc"))
+            errors += caught.value.args
+        raise Tf.ErrorException(*errors)
 
     monkeypatch.setattr(UsdUtils, "CreateNewUsdzPackage", fail)
-    with pytest.raises(OSError, match=r"could not write .*robots\.usdz"):
+    with pytest.raises(OSError, match=r"could not write .*robots\.usdz") as refused:
         ws.export_usd(result, tmp_path / "robots.usdz")
+    assert str(refused.value).count("absent.usdc") == 1
     assert list(tmp_path.iterdir()) == []
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = ["DemoCommand"]
-
-DemoName = Literal[NAMES]  # type: ignore[valid-type]
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class DemoCommand:
     NAME.toml (its scene file, for warp-springs run).
     """
 
-    name: Annotated[Positional[DemoName | None], arg(metavar="NAME")] = None
+    name: Annotated[Positional[str | None], arg(metavar="NAME")] = None
     """Which demonstration: --list names them."""
     out: Path = Path("out")
     """Folder to write to; made if it is missing."""
@@ -43,19 +42,26 @@ class DemoCommand:
         """Simulate, export, and say what was written."""
         from warp_springs import demos
         from warp_springs.config import parse_settings
+        from warp_springs.io.outputs import made_folder
 
         if self.list or self.name is None:
             print("\n".join(f"{name:<16}{demos.about(name)}" for name in NAMES))
             return 0 if self.list else 2
+        if self.name not in NAMES:
+            near = difflib.get_close_matches(self.name, NAMES, 1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise ValueError(f"there is no demonstration {self.name!r}{hint}; there are "
+                             f"{', '.join(NAMES)}")  # fmt: skip
         if self.toml:
             print(demos.text(self.name), end="")
             return 0
-        overrides = parse_settings(self.set)
+        config = demos.load(self.name, parse_settings(self.set))
+        made_folder(self.out)
         if self.name == "slope":
             from warp_springs.demos.slope import demonstrate
 
-            return demonstrate(demos.load(self.name, overrides), self.out, console)
-        return self._simulate(demos.load(self.name, overrides), console)
+            return demonstrate(config, self.out, console)
+        return self._simulate(config, console)
 
     def _simulate(self, config, console: Console) -> int:
         from warp_springs.commands.scenes import print_rows, simulated, write_and_say

@@ -37,6 +37,8 @@ class InfoCommand:
         print_rows(console, _machine() if self.file is None else self._of_file())
 
     def _of_file(self) -> list[Row]:
+        if self.file.is_dir():
+            raise IsADirectoryError(f"{self.file}: this is a folder, expected a file")
         if not self.file.is_file():
             raise FileNotFoundError(f"{self.file}: there is no such file")
         readers: dict[str, Callable[[Path], list[Row]]] = {".toml": _scene, ".npz": _saved}
@@ -109,7 +111,8 @@ def _saved(path: Path) -> list[Row]:
     result = ws.Result.load(path)
     rows = [("holds", "a result"), ("robots", f"{len(result):,}")]
     if len(result.times):
-        frames = f"{len(result.times):,} of {len(result.recorded):,} robots"
+        some = "1 robot" if len(result.recorded) == 1 else f"{len(result.recorded):,} robots"
+        frames = f"{len(result.times):,} of {some}"
         rows.append(("frames", f"{frames}, {result.times[0]:g} s to {result.times[-1]:g} s"))
     method = f"{result.integrator}, {result.precision}, step {result.dt:g} s, {result.device}"
     rows += [("method", method), *outcome(result)]

@@ -110,6 +110,8 @@ class RenderCommand:
         cycles = [2 * math.pi / abs(b.omega) for b in bodies if b.is_actuated and b.omega]
         needed = LEAST_CYCLES * max(cycles, default=0.0)
         start = self.start or 0.0
+        if not needed and len(result.times) > 1:  # nothing has cycles: a film shows what there is
+            return result, self
         held = result.times[-1] - result.times[0] - start if len(result.times) else 0.0
         if held >= needed * (1 - 1e-6) and len(result.times) > 1:
             return result, self

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RunCommand"]
 
+ANYWHERE = "127.0.0.1:0"
+
 
 @dataclass(frozen=True)
 class RunCommand:
@@ -41,7 +43,7 @@ class RunCommand:
     live: FlagCreatePairsOff[bool] = False
     """Serve a page with the frames so far and a curve while it runs, to this machine only; its
     address is printed."""
-    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = "127.0.0.1:0"
+    live_at: Annotated[str, arg(metavar="ADDRESS:PORT")] = ANYWHERE
     """Where to serve it; port 0 takes one that is free."""
     keys: bool = False
     """Print all keys with their defaults and what they mean instead."""
@@ -51,6 +53,7 @@ class RunCommand:
         from warp_springs.commands.live import watching
         from warp_springs.commands.scenes import simulated, write_and_say
         from warp_springs.config import SceneFile, load_scene, parse_settings, reference
+        from warp_springs.io.outputs import made_folder
         from warp_springs.view.pages.live import LiveServer
 
         if self.keys:
@@ -61,6 +64,9 @@ class RunCommand:
             return 2
         config = load_scene(self.scene, parse_settings(self.set))
         place = LiveServer.place(self.live_at)
+        if self.live_at != ANYWHERE and not self.live:
+            raise ValueError(f"--live-at {self.live_at} goes with --live")
+        made_folder(self.out)
         with watching(config, place, console) if self.live else nullcontext() as watch:
             result = simulated(config, console, watch)
         write_and_say(config, result, self.out, console)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["checked_output", "written_beside"]
+__all__ = ["checked_output", "made_folder", "written_beside"]
 
 _DRAFT = ".draft-"
 
@@ -34,6 +34,20 @@ def checked_output(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Pat
         raise NotADirectoryError(f"path: there is no folder {path.parent} to write into")
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise PermissionError(f"path: no permission to write into the folder {path.parent}")
+    return path
+
+
+def made_folder(path: Path) -> Path:
+    """A folder to write into, made if it is missing, refused before any work is done.
+
+    Raises:
+        OSError: Something else is there, or nobody may write there.
+    """
+    if path.exists() and not path.is_dir():
+        raise NotADirectoryError(f"out: {path} is no folder; choose another with --out")
+    path.mkdir(parents=True, exist_ok=True)
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise PermissionError(f"out: no permission to write into the folder {path}")
     return path
 
 

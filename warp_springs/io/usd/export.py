@@ -32,7 +32,7 @@ from warp_springs.view import appearance
 from warp_springs.view.pictures.solids import obstacle_mesh
 
 if TYPE_CHECKING:
-    from pxr import Usd, UsdGeom
+    from pxr import Tf, Usd, UsdGeom
 
     from warp_springs.io.usd.body import Body
     from warp_springs.io.usd.stage import Looks
@@ -311,10 +311,15 @@ def _renamed_when_done(path: Path) -> Iterator[Path]:
             elif kind == ".usdz":
                 UsdUtils.CreateNewUsdzPackage(str(draft), str(finished))
         except Tf.ErrorException as error:
-            raise OSError(f"path: USD could not write {path}: {error}") from error
+            raise OSError(f"path: USD could not write {path}: {_first(error)}") from error
     # A stage that is open on the old file in this process shows the new one.
     if layer := Sdf.Layer.Find(str(path)):
         layer.Reload(force=True)
+
+
+def _first(error: Tf.ErrorException) -> str:
+    """The first complaint of USD, which complains once for every block that it could not write."""
+    return str(error.args[0].commentary) if error.args else str(error)
 
 
 def _solid_boxes(result: Result) -> list[np.ndarray]:

@@ -79,5 +79,5 @@ def checked_labels(labels: Sequence[str] | None, count: int) -> list[str] | None
     if labels is None:
         return None
     if isinstance(labels, str) or len(labels) != count:
-        raise ValueError(f"labels must be {count} texts, one for each robot, got {labels!r}")
+        raise ValueError(f"labels: got {labels!r}, expected a text for each robot shown ({count})")
     return [str(label) for label in labels]

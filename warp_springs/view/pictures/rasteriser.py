@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from warp_springs.engine.layouts import device_named
 from warp_springs.kernels import raster, shading
 from warp_springs.view import appearance
 from warp_springs.view.pictures.camera import Camera, view_axes
@@ -99,7 +100,7 @@ class Rasteriser:
         """
         self.size = _checked_size(size)
         self._map_size, self._asked_threads = map_size, threads
-        self.device = wp.get_device(device)
+        self.device = device_named(device)
         self._launch = functools.partial(wp.launch, device=self.device)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, got {threads}")
