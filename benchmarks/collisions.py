@@ -4,7 +4,7 @@ Without arguments: two balls crash, and a pile of cubes lies, with and without c
 threads. Pairs are those that are near enough to be looked at in every kick, at the end of the run;
 their rate is that of the time which collisions add. Before a time is printed the balls must have
 bounced off each other with their momentum and energy, and the cubes must lie on each other.
-``--rest 600`` leaves a pile alone for ten minutes: nothing may drift, creep, or warm up.
+``--rest 3600 --cubes 3`` leaves a pile alone for an hour: nothing may drift, creep, or warm up.
 ``--broad`` compares the search for pairs that are near with Warp's BVH and hash grid.
 ``--piles 10`` drops ten cubes from ten seeds, in every layout and with every integrator.
 """
@@ -165,21 +165,22 @@ def _validate(result: ws.Result, first: slice, mass: float) -> None:
         raise SystemExit("energy was made or lost")
 
 
-def resting(seconds: float, seed: int = 1) -> dict:
+def resting(seconds: float, count: int, seed: int = 1) -> dict:
     """Lay a pile down with damping, end the damping, and wait."""
-    still = ws.Simulation(dropped(seed), box(damping=5.0), world="together")
+    still = ws.Simulation(dropped(seed, count), box(damping=5.0), world="together")
     start = still.run(20.0)
     members = [place for _, place in still.members[0]]
     at = start.positions(0)
     cubes = [
         cube.replace(positions=at[place], velocities=None)
-        for cube, place in zip(dropped(seed), members, strict=True)
+        for cube, place in zip(dropped(seed, count), members, strict=True)
     ]
     simulation = ws.Simulation(cubes, box(damping=0.0), world="together", threads=1)
     result = simulation.run(seconds, fps=200 / seconds, energy=True)
     frames, kinetic = result.frames(0), result.energy.kinetic[0]
     lift = 9.81 * 0.8 * EDGE
     return {
+        "cubes": count,
         "seconds": seconds,
         "status": ws.Status(result.status[0]).name,
         "drift of the last tenth [m]": float(
@@ -213,12 +214,13 @@ def main() -> None:
     parser.add_argument("--layouts", nargs="+", default=["lanes", "flat"])
     parser.add_argument("--integrators", nargs="+", default=["chin4", "leapfrog", "euler"])
     parser.add_argument("--rest", type=float, help="seconds that a pile is left alone")
+    parser.add_argument("--cubes", type=int, default=10, help="in the pile that is left alone")
     parser.add_argument("--broad", action="store_true", help="the broad phase alone")
     parser.add_argument("--balls", type=int, nargs="+", default=[2, 3, 4], help="subdivisions")
     given = parser.parse_args()
     ws.quiet()
     if given.rest:
-        table([resting(given.rest)])
+        table([resting(given.rest, given.cubes)])
         return
     if given.broad:
         table(collisions_broad.compare(touching(subdivisions)) for subdivisions in given.balls)
