@@ -171,6 +171,19 @@ def test_it_works_in_a_sandboxed_frame(browser, result, tmp_path):
     assert page.complaints == []
 
 
+def test_a_frame_that_has_no_size_at_first_is_drawn_when_it_gets_one(browser, result, tmp_path):
+    inner = html.escape(ws.html_page(result))
+    outer = tmp_path / "outer.html"
+    outer.write_text(f'<iframe width=0 height=0 style="border:0" srcdoc="{inner}"></iframe>')
+    page = browser.open(outer.as_uri(), size=(760, 460))
+    inside = "document.querySelector('iframe').contentWindow"
+    page.wait(f"{inside}.document.body?.dataset.state === 'ready'")
+    page.evaluate("Object.assign(document.querySelector('iframe'), { width: 700, height: 400 })")
+    page.wait(f"{inside}.document.getElementById('stage').classList.contains('drawn')")
+    picture = settled(page)[20:300, 20:400]
+    assert 0.0005 < (picture.max(axis=2) < 50).mean() < 0.2, "masses on a floor, not black"
+
+
 def test_the_page_holds_the_positions_and_colours_of_the_result(result):
     header, data = described(result, None, {}, {}, grid=False, spacing=None)
     arrays = Arrays(data)

@@ -148,7 +148,8 @@ class Show {
       box.low[2] = reach.low[2];
       box.high[2] = reach.high[2];
     }
-    this.camera.frame(box, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+    this.framed = canvas.clientWidth > 0 && canvas.clientHeight > 0;
+    this.camera.frame(box, this.framed ? canvas.clientWidth / canvas.clientHeight : 1);
     if (!this.everyone) this.camera.distance *= 1.35;
     this.followed = this.followedAt(moment);
     this.wake();
@@ -192,7 +193,8 @@ class Show {
     $("reset").onclick = () => this.reset();
     $("keys").onclick = () => this.help();
     document.addEventListener("keydown", (event) => this.key(event));
-    new ResizeObserver(() => this.wake()).observe($("stage"));
+    // A frame in another page may be loaded before it has a size.
+    new ResizeObserver(() => (this.framed ? this.wake() : this.reset())).observe($("stage"));
     new ResizeObserver(() => this.wake()).observe($("panel"));
     handle($("view"), this);
   }
@@ -287,6 +289,7 @@ class Show {
 
   // The sky is seen until the first picture is complete, which takes long without a GPU.
   unveil() {
+    if (!this.framed) return;
     if (!this.painter.finished()) return this.wake();
     $("stage").classList.add("drawn");
     if (parent !== window) parent.postMessage("drawn", "*");  // who waited with showing the frame
