@@ -174,8 +174,8 @@ class Simulation:
             progress: Called now and then with the fraction that is done, 0 to 1.
 
         Raises:
-            ValueError: ``duration`` or ``fps`` is not positive, ``fps`` asks for more frames than
-                there are steps, or ``record`` is out of range or given without ``fps``.
+            ValueError: ``duration`` or ``fps`` is not positive, or ``record`` is out of range or
+                given without ``fps``.
             RuntimeError: An earlier run was interrupted.
         """
         check_number("duration", duration, above=0.0)
@@ -272,9 +272,6 @@ class Simulation:
                 raise ValueError("record: frames are taken at a rate; give fps as well")
             return np.zeros(0, np.int64)
         check_number("fps", fps, above=0.0)
-        if fps * self.dt > 1.0 + 1e-6:
-            most = f"{1.0 / self.dt:,.6g} 1/s, one frame a step of {self.dt:g} s"
-            raise ValueError(f"fps: got {fps:g}, expected at most {most}")
         robots = list(range(count) if record is None else record)
         for robot in robots:
             if not isinstance(robot, (int, np.integer)) or not -count <= robot < count:

@@ -223,7 +223,6 @@ def test_malformed_options_are_refused_by_name(cube, options, named):
         ({"duration": 0.1, "fps": 0}, "fps"),
         ({"duration": 0.1, "fps": -30}, "fps"),
         ({"duration": 0.1, "fps": np.nan}, "fps"),
-        ({"duration": 0.1, "fps": 1e6}, r"fps: got 1e\+06, expected at most"),
         ({"duration": 0.1, "fps": 10, "record": [3]}, "record"),
         ({"duration": 0.1, "fps": 10, "record": [-4]}, "record"),
         ({"duration": 0.1, "record": [0]}, "fps"),  # frames of nothing
