@@ -47,7 +47,9 @@ def _pid(workshop) -> int:
 
 
 def test_what_the_cluster_does_not_have_is_named():
-    with pytest.raises(ConfigError, match=r"simulation.devices must say how many workers"):
+    with pytest.raises(
+        ConfigError, match=r"simulation: cluster: devices must say how many workers"
+    ):
         load("cube", TINY | {"simulation.cluster": "local"})
     config = load("cube", TINY | TWO | {"simulation.cluster": "ray://127.0.0.1:1"})
     with pytest.raises(RunError, match=r"simulation\.cluster = 'ray://127\.0\.0\.1:1'"):
