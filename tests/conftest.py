@@ -38,3 +38,14 @@ def walker():
     return body.replace(
         amplitude=0.08 * body.rest_length, phase=np.linspace(0.0, 6.0, springs), omega=12.0
     ).moved((0.0, 0.0, 0.02))
+
+
+@pytest.fixture(scope="session")
+def breaking_rod():
+    """Two masses that fly apart in the void; the spring between them breaks when it is stretched
+    by 0.1 m, a little after 0.05 s."""
+    import warp_springs as ws
+
+    ends, apart = [(-0.1, 0.0, 0.1), (0.1, 0.0, 0.1)], [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    rod = ws.Robot(masses=1.0, positions=ends, springs=[(0, 1)], stiffness=100.0, velocities=apart)
+    return rod.with_limits(breaks=10.0)

@@ -326,12 +326,9 @@ def test_arrows_show_forces_while_they_act():
         assert abs(shown[frame][0] - shown[frame][2]) < 60
 
 
-def test_broken_springs_are_no_longer_drawn():
-    ends = [(-0.1, 0.0, 0.1), (0.1, 0.0, 0.1)]
-    apart = [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
-    rod = ws.Robot(masses=1.0, positions=ends, springs=[(0, 1)], stiffness=100.0, velocities=apart)
+def test_broken_springs_are_no_longer_drawn(breaking_rod):
     space = ws.Scene(ground=None, gravity=(0, 0, 0))
-    result = ws.Simulation([rod.with_limits(breaks=10.0)], space).run(0.2, fps=100)
+    result = ws.Simulation(breaking_rod, space).run(0.2, fps=100)
     broke = result.broken(0)[0]  # stretched by 0.1 m: after 0.05 s and a little
     assert 0.05 < broke < 0.07
     camera = Camera(eye=(0.0, -1.0, 0.1), target=(0.0, 0.0, 0.1))
